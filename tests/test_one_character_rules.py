@@ -36,7 +36,7 @@ def test_a_conflict_is_reported_until_the_server_heard_of_it(heard: float | None
     """``assembly_quantity`` None is "heard of no quantity", not "heard of this one"."""
     line = {"child_part_number": "A", "quantity": 7, "source": "manual", "assembly_told": True}
     plan = plan_merge([{"child_part_number": "A", "quantity": 4}], [{**line, "assembly_quantity": heard}])
-    assert (plan.tell == ("A",)) == told
+    assert (plan.conflicts_to_report == ("A",)) == told
 
 
 def test_a_path_on_another_drive_stays_whole() -> None:

@@ -35,7 +35,7 @@ from silo.bom.errors import DocumentError, Exit, InputError, RemoteError, SiloEr
 from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.items.naming import display_name
 from silo.bom.view.diff_rows import diff_json, diff_rows
-from silo.bom.view.folders import base_of, project_folder, shorten
+from silo.bom.view.folders import base_folder, project_folder, shorten
 from silo.bom.view.tree_json import entry_json, finding_json
 from silo.bom_sync.resolved import Resolved, assemblies, blocking, resolve
 from silo.bom_sync.steps import Outcome, Status, SyncApi, server_lines, sync_tree
@@ -115,7 +115,7 @@ def sync_top(top: str, extraction: Extraction | SiloError, api: SyncApi, options
     """Sync one file's BOM, or say why it was not read."""
     if isinstance(extraction, SiloError):
         return TopResult(top, error=extraction)
-    base = base_of(extraction)
+    base = base_folder(extraction)
     if options.skip_parts and not extraction.entries and not extraction.blocked:
         return TopResult(top, base, skipped="no components of other files: a part, not an assembly")
     if options.skip_parts and not extraction.blocked and _is_library(extraction):

@@ -47,7 +47,7 @@ from silo.api.wire import (
     User,
 )
 from silo.bom.compare.answer import summary
-from silo.bom.compare.base_revision import base_of, would_undo
+from silo.bom.compare.base_revision import base_revision_of, would_undo
 from silo.bom.compare.merge import apply_merge, plan_merge
 from silo.bom.errors import (
     ConflictError,
@@ -116,7 +116,7 @@ def check_base(stored: Stored, base: int | None, checksum: str | None) -> None:
 def check_document(stored: Stored, base: int | None, checksum: str | None) -> None:
     """Check the same for the BOM of a file."""
     same = [r.revision_number for r in stored.revisions if checksum and r.file_checksum == checksum]
-    check_base(stored, base_of(base, checksum, max(same, default=None)), checksum)
+    check_base(stored, base_revision_of(base, checksum, max(same, default=None)), checksum)
 
 
 def _nothing(name: str) -> None:

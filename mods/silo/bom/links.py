@@ -221,8 +221,8 @@ class _Walker:
         """
         if isinstance(obj, Lost):
             return (self._files.canonical(obj.file), obj.name)
-        if (component_known := self._components.get(id(obj))) is not None:
-            return component_known[1]
+        if (cached := self._components.get(id(obj))) is not None:
+            return cached[1]
         key = self._component(obj)
         self._components[id(obj)] = (obj, key)
         return key

@@ -20,7 +20,7 @@ from silo.bom.errors import counted
 from silo.bom.findings import Finding, Severity
 from silo.bom.items.naming import display_name
 from silo.bom.view.diff_rows import diff_rows
-from silo.bom.view.folders import base_of, shorten
+from silo.bom.view.folders import base_folder, shorten
 from silo.bom.view.tree_json import MOST_LINES, check_tree_size
 from silo.cli.terminal import plain, table_of
 
@@ -64,7 +64,7 @@ def entry_text(entry: BomEntry, base: str) -> Text:
 
 def bom_tree(extraction: Extraction, base: str = "") -> Tree:
     """Draw the multi-level BOM; quantities are per one parent, paths as in :func:`bom_json`."""
-    base = base or base_of(extraction)
+    base = base or base_folder(extraction)
     head = extraction.assembly
     title = Text(plain(head.part_number or display_name(head)), "bold")
     if head.name:

@@ -31,7 +31,7 @@ from typing import IO, Any
 from sqlalchemy import ColumnElement, Row, delete, func, insert, select, update
 
 from silo.api.wire import FACTS, FactSource
-from silo.bom.compare.base_revision import base_of, would_undo
+from silo.bom.compare.base_revision import base_revision_of, would_undo
 from silo.bom.errors import NewerRevisionError, NotFoundError, RejectedError
 from silo.platform import no_device_name, remove_patiently, replace_patiently, sync_folder
 from silo_server.db.rows import insert_rows, one_of
@@ -346,11 +346,12 @@ def _check_base(tx: Tx, of: Item | Document, base: int | None, checksum: str | N
 
 def check_document(tx: Tx, item: Item, base: int | None, checksum: str | None) -> None:
     """Raise :class:`NewerRevisionError` if a BOM is that of an older file and would undo the newest one's,
-    :class:`MissingRevisionError` if its file is not here (:func:`silo.bom.compare.base_revision.base_of`)."""
+    :class:`MissingRevisionError` if its file is not here (:mod:`silo.bom.compare.base_revision`)."""
     same = select(func.max(revisions.c.revision_number)).where(
         revisions.c.item_id == item.id, revisions.c.file_checksum == checksum
     )
-    _check_base(tx, item, base_of(base, checksum, tx.conn.scalar(same) if checksum else None), checksum)
+    made_from = base_revision_of(base, checksum, tx.conn.scalar(same) if checksum else None)
+    _check_base(tx, item, made_from, checksum)
 
 
 def list_revisions(

@@ -34,7 +34,7 @@ def would_undo(newest: FileRevision | None, base: int | None, sha256: str | None
     return newest.revision_number > base and newest.file_checksum != sha256
 
 
-def base_of(revision: int | None, sha256: str | None, same: int | None) -> int | None:
+def base_revision_of(revision: int | None, sha256: str | None, same: int | None) -> int | None:
     """Return the revision that a merge's document is, or was made from; None if it is not known.
 
     revision, sha256

@@ -30,15 +30,15 @@ from silo.bom.quantities import same_quantity
 class MergePlan:
     """What a merge will write: the diff, and which unreferenced flags it sets and clears (part numbers).
 
-    ``tell`` names lines of people whose quantity in the assembly the server does not know yet: a new
-    conflict, a changed one, or one that is over. No line is written for them, but the server must ask a
-    person, or stop asking.
+    ``conflicts_to_report`` names manual lines whose quantity in the assembly the server does not know yet: a
+    new conflict, a changed conflict, or a conflict that is over. No line is written for them, but the server
+    must ask its reviewers, or stop asking.
     """
 
     diff: BomDiff
     flag: tuple[str, ...] = ()
     unflag: tuple[str, ...] = ()
-    tell: tuple[str, ...] = ()
+    conflicts_to_report: tuple[str, ...] = ()
 
     @property
     def writes(self) -> bool:
@@ -47,8 +47,8 @@ class MergePlan:
 
     @property
     def news(self) -> bool:
-        """Return True if the server learns anything from this merge; if not, it need not be sent."""
-        return self.writes or bool(self.tell)
+        """Return True if the merge would change anything on the server; if not, it need not be sent."""
+        return self.writes or bool(self.conflicts_to_report)
 
 
 def plan_merge(
@@ -68,40 +68,38 @@ def plan_merge(
     missing
         as in :func:`silo.bom.compare.difference.diff_bom`: the lines of these components stay as they are.
     """
-    local, line_known = list(entries), list(lines)
-    diff = diff_bom(local, line_known, missing)
+    local, lines = list(entries), list(lines)
+    diff = diff_bom(local, lines, missing)
     kept = {change.part_number for change in diff.kept}
-    line_known = [line for line in line_known if line["child_part_number"] not in kept]
+    lines = [line for line in lines if line["child_part_number"] not in kept]
     flagged = {
-        line["child_part_number"]
-        for line in line_known
-        if line.get("unreferenced_since") and not is_manual(line)
+        line["child_part_number"] for line in lines if line.get("unreferenced_since") and not is_manual(line)
     }
     gone = [change.part_number for change in diff.removed]
     return MergePlan(
         diff=diff,
         flag=tuple(number for number in gone if number not in flagged),
         unflag=tuple(sorted(flagged.difference(gone))),
-        tell=_untold(diff, local_quantities(local), line_known),
+        conflicts_to_report=_unreported(diff, local_quantities(local), lines),
     )
 
 
-def _untold(
+def _unreported(
     diff: BomDiff, local: Mapping[str, float | None], lines: Iterable[Mapping[str, Any]]
 ) -> tuple[str, ...]:
     in_conflict = {change.part_number for change in diff.conflicts}
-    untold = []
+    unreported = []
     for line in lines:
-        number, components = line["child_part_number"], line.get("assembly_told")
-        if components is None or not is_manual(line) or not is_component(line):
+        number, is_reported = line["child_part_number"], line.get("assembly_told")
+        if is_reported is None or not is_manual(line) or not is_component(line):
             continue
         # An override of a line that the assembly once owned is in conflict too if the assembly drops it.
         now = local.get(number, 0.0)
         dropped = number not in local and bool(line.get("override"))
-        changed = components and not same_quantity(line.get("assembly_quantity"), now)
-        if changed or (not components and (number in in_conflict or dropped)):
-            untold.append(number)
-    return tuple(untold)
+        changed = is_reported and not same_quantity(line.get("assembly_quantity"), now)
+        if changed or (not is_reported and (number in in_conflict or dropped)):
+            unreported.append(number)
+    return tuple(unreported)
 
 
 def apply_merge(lines: Sequence[Mapping[str, Any]], plan: MergePlan, when: str) -> list[dict[str, Any]]:

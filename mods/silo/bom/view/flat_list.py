@@ -9,7 +9,7 @@ from typing import Any
 from silo.bom.document import relative
 from silo.bom.entry import BomEntry, Extraction, walk_entries
 from silo.bom.items.naming import display_name
-from silo.bom.view.folders import base_of
+from silo.bom.view.folders import base_folder
 
 # A CAD model counts pieces.
 PIECES = "pcs"
@@ -46,7 +46,7 @@ def flat_json(extraction: Extraction) -> list[dict[str, Any]]:
     ``part_number`` and ``name`` as far as they are known, ``quantity`` multiplied down the tree, ``unit``,
     the ``standard`` or the file (``doc_path``, ``object``), and if it is ``missing``.
     """
-    base = base_of(extraction)
+    base = base_folder(extraction)
     return [
         {
             "part_number": entry.part_number,

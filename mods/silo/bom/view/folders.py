@@ -26,7 +26,7 @@ def project_folder(path: str, top: str = "", rules: ModuleType = os.path) -> str
     return f"{name}/{inner}" if name else inner
 
 
-def base_of(extraction: Extraction) -> str:
+def base_folder(extraction: Extraction) -> str:
     """Return the folder to which printed paths are relative: that of the top file."""
     return os.path.dirname(extraction.assembly.doc_path)
 

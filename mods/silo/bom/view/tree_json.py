@@ -10,7 +10,7 @@ from silo.bom.document import relative
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import InputError
 from silo.bom.findings import Finding
-from silo.bom.view.folders import base_of, shorten
+from silo.bom.view.folders import base_folder, shorten
 
 # A line takes about 1 kB of memory on its way to JSON or to a terminal.
 MOST_LINES = 500_000
@@ -80,7 +80,7 @@ def bom_json(extraction: Extraction, base: str = "") -> dict[str, Any]:
     Paths are relative to ``base``; without it, to the folder of the assembly's file.
     """
     check_tree_size(extraction)
-    base = base or base_of(extraction)
+    base = base or base_folder(extraction)
     head = extraction.assembly
     return {
         "assembly": {

@@ -188,7 +188,7 @@ class Notes:
         """Report a file that a FreeCAD newer than the tested ones saved."""
         version = saved_by(getattr(document, "ProgramVersion", ""))
         if version > NEWEST_TESTED:
-            texts = [".".join(map(str, version_parts)) for version_parts in (version, NEWEST_TESTED)]
+            texts = [".".join(map(str, each)) for each in (version, NEWEST_TESTED)]
             root = DocumentRoot(document)
             self.add(FindingCode.NEWER_FREECAD, root, "", version=texts[0], newest=texts[1])
 

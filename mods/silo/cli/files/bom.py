@@ -15,7 +15,7 @@ from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import BusyError, Exit, InputError
 from silo.bom.findings import FindingCode
 from silo.bom.view.flat_list import flat_json
-from silo.bom.view.folders import base_of
+from silo.bom.view.folders import base_folder
 from silo.bom.view.tree_json import bom_json
 from silo.cli.connection import client_of, reach
 from silo.cli.files.bom_table import table_rows, write_csv, write_xlsx
@@ -97,7 +97,7 @@ def run_bom(args: argparse.Namespace) -> int:
     )
     if findings:
         out.print()
-        out.print(findings_text(findings, base_of(extraction)))
+        out.print(findings_text(findings, base_folder(extraction)))
     if summary:
         out.print()
         out.print(summary_text(summary))
@@ -145,7 +145,7 @@ def _show_each(args: argparse.Namespace) -> int:
             tops = [(plan.extraction(node, reading), base) for layer in plan.layers for node in layer]
         errors = {relative(top, base): str(error) for top, error in plan.errors.items()}
     else:
-        tops = [(extraction_of_top, base_of(extraction_of_top)) for extraction_of_top in read_tops(args)]
+        tops = [(extraction_of_top, base_folder(extraction_of_top)) for extraction_of_top in read_tops(args)]
     if args.json:
         print_json({"assemblies": [bom_json(*root) for root in tops], "errors": errors})
     for extraction, base in tops if not args.json else ():

@@ -9,7 +9,7 @@ import sys
 from typing import Any
 
 from silo.bom.errors import InputError, SiloError
-from silo.bom.view.folders import base_of
+from silo.bom.view.folders import base_folder
 from silo.bom.view.tree_json import bom_json
 from silo.cli.json_output import print_json
 
@@ -51,5 +51,5 @@ def verify(args: argparse.Namespace) -> int:
         mark = "✓" if account["agrees"] else "✗"
         out.print(f"{mark} {plain(account['sentence'])}", markup=False)
     if error.blocked:
-        out.print(findings_text(error.findings, base_of(error)))
+        out.print(findings_text(error.findings, base_folder(error)))
     return int(differs)

@@ -13,7 +13,7 @@ from silo.bom.document import relative
 from silo.bom.errors import Exit
 from silo.bom.items.naming import display_name
 from silo.bom.view.diff_rows import diff_json
-from silo.bom.view.folders import base_of
+from silo.bom.view.folders import base_folder
 from silo.bom.view.tree_json import finding_json
 from silo.cli.connection import client_of, reach
 from silo.cli.json_output import print_json
@@ -46,7 +46,7 @@ def run_diff(args: argparse.Namespace) -> int:
         lines = [server_lines(resolved, client) for resolved in chosen]
         whole = suggest_by_identity(whole, list(zip(chosen, lines, strict=True)))
     compared = [(resolved, resolved.diff(rows)) for resolved, rows in zip(chosen, lines, strict=True)]
-    base = base_of(extraction)
+    base = base_folder(extraction)
     drifted = bool(whole.unresolved or whole.assembly.part_number is None) or any(
         diff.drifted or (blocking(resolved) and not args.allow_missing) for resolved, diff in compared
     )

@@ -85,12 +85,12 @@ def _push(args: argparse.Namespace, report: InertiaReport) -> int:
     """Push the masses to the items with the part numbers of the documents' identities; --item replaces that
     of the top assembly.
     """
-    from silo.bom.view.folders import base_of
+    from silo.bom.view.folders import base_folder
     from silo.bom_sync.resolved import resolve
     from silo.inertia.geometry.freecad import product_key
 
     extraction = read_tops(args)[0]
-    base = base_of(extraction)
+    base = base_folder(extraction)
     with client_of(args) as client:
         resolved = resolve(extraction, client)
     numbers = {

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from silo.bom.document import relative
 from silo.bom.entry import Extraction, walk_entries
 from silo.bom.errors import Exit, InputError
-from silo.bom.view.folders import base_of
+from silo.bom.view.folders import base_folder
 from silo.cli.connection import client_of
 from silo.cli.options import add_options, add_top, not_with, only_with
 from silo.cli.reading import plan_of, read_tops
@@ -122,7 +122,7 @@ def run_register(args: argparse.Namespace) -> int:
             raise InputError(f"{args.plan} is there already, and may hold edits; name another file")
     rows = read_table(Path(args.apply).read_bytes(), args.apply) if args.apply else []
     extraction, unused, unread = _read(args)
-    base = os.path.realpath(args.top) if os.path.isdir(args.top) else base_of(extraction)
+    base = os.path.realpath(args.top) if os.path.isdir(args.top) else base_folder(extraction)
     with client_of(args) as client:
         schema = client.find_schema(args.schema)
         offer_made = _offer(extraction, client, schema, args)
@@ -138,7 +138,7 @@ def _read(args: argparse.Namespace) -> tuple[Extraction, frozenset[str], bool]:
     """Read the components, the files that no assembly uses, and if any file cannot be read."""
     if not os.path.isdir(args.top):
         extraction = read_tops(args)[0]
-        return extraction, frozenset(), _tell_missing(extraction, base_of(extraction))
+        return extraction, frozenset(), _tell_missing(extraction, base_folder(extraction))
     with plan_of(args) as (plan, reading, base):
         for path, error in plan.errors.items():
             print(f"silo-mod: {relative(path, base)} is left out: {error}", file=sys.stderr)

@@ -24,7 +24,7 @@ from silo.batch import source_document
 from silo.bom.consolidation import consolidation_findings
 from silo.bom.entry import Extraction
 from silo.bom.errors import Exit, InputError, ServerFaultError
-from silo.bom.view.folders import base_of
+from silo.bom.view.folders import base_folder
 from silo.bom_sync.activity_text import activity_text
 from silo.bom_sync.resolved import resolve
 from silo.bom_sync.steps import Outcome, Status, sync_tree
@@ -154,7 +154,7 @@ class Demo:
         extraction = read_assembly(str(self.top))
         self.out.print(bom_tree(extraction))
         findings = (*extraction.findings, *consolidation_findings(extraction.entries))
-        self.out.print(findings_text(findings, base_of(extraction)))
+        self.out.print(findings_text(findings, base_folder(extraction)))
         return extraction
 
     def _register(self, extraction: Extraction) -> None:
