@@ -15,7 +15,7 @@ from warm_reader import stand_in
 
 from silo.bom.findings import FindingCode
 from silo.cli.parser import build_parser
-from silo.workbench.settings import DEFAULTS
+from silo.workbench.settings.preferences import DEFAULTS
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [

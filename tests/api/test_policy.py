@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.api.client import SiloClient
-from silo.api.pause import Pause
-from silo.api.policy import LONGEST_TOLD, Backoff, ErrorScope, Then, Verdict, judge, may_repeat, pause_after
+from silo.api.pause import LONGEST_TOLD, Pause
+from silo.api.policy import Backoff, ErrorScope, Then, Verdict, judge, may_repeat, pause_after
 from silo.api.replies import WebPageError
 from silo.bom import errors
 from silo.bom.errors import (

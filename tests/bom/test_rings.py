@@ -6,7 +6,8 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from silo.bom.links import Graph, Key, Rings, strongly_connected
+from silo.bom.key import Key
+from silo.bom.links import Graph, Rings, strongly_connected
 
 
 def graph(**edges: str) -> Graph:

@@ -19,7 +19,7 @@ from silo.bom.items.schema import Categories
 from silo.registering.candidate import Candidate, ComponentState, OpenedFile
 from silo.registering.offer import Offer, offer
 from silo.testing import FakeSilo
-from silo.workbench.register.flow import EditedRow
+from silo.workbench.register.rows import EditedRow
 from silo.workbench.session.worker import Control
 
 CONTROL = Control(lambda _detail, _fraction: None)

@@ -11,9 +11,10 @@ from server_testing import Answer, Api, sqlite_database
 from sqlalchemy import event
 from sqlalchemy.exc import DataError, DisconnectionError, IntegrityError, OperationalError
 
+from silo_server.actors import Role
 from silo_server.db.database import Database
 from silo_server.run import RunningServer, create_app, prepare, running_server
-from silo_server.services.access import Role, list_users
+from silo_server.services.access import list_users
 from silo_server.settings import Settings
 
 

@@ -30,10 +30,10 @@ from silo.workbench.commit.plan import CommitPlan
 from silo.workbench.documents.opened import DocumentOrigin
 from silo.workbench.documents.snapshot import Snapshot
 from silo.workbench.ghost import Differences, Ghost
-from silo.workbench.preview.flow import Preview
+from silo.workbench.preview.comparison import Preview
 from silo.workbench.session.session import Session
 from silo.workbench.session.state import Listener
-from silo.workbench.settings import DEFAULTS, Preferences
+from silo.workbench.settings.preferences import DEFAULTS, Preferences
 from silo.workbench.settings.server import ServerPreferences
 
 WAIT_S = 300  # reached only if the test fails; a busy machine may need minutes

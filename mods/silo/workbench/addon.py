@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from silo.workbench.freecad import host
 from silo.workbench.gui import qt
 from silo.workbench.pane.dock import ActivityDock
-from silo.workbench.settings import GROUP, Preferences
+from silo.workbench.settings.preferences import GROUP, Preferences
 from silo.workbench.words import plain, translate
 
 if TYPE_CHECKING:
@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from silo.workbench.live_desk import LiveDesk
     from silo.workbench.preview.flow import PreviewFlow
     from silo.workbench.register.flow import RegisterFlow
-    from silo.workbench.revisions.flow import ProjectFlow, RevisionFlow
+    from silo.workbench.revisions.flow import RevisionFlow
+    from silo.workbench.revisions.project import ProjectFlow
     from silo.workbench.session.session import Session
     from silo.workbench.session.state import PaneState
 
@@ -88,7 +89,7 @@ class AddOn:
         self._timer.timeout.connect(self.session.tick)
         self._timer.start(TICK_MS)
         qt.QtCore.QCoreApplication.instance().aboutToQuit.connect(self._end)
-        from silo.workbench.gui.widgets import CloseWatch
+        from silo.workbench.gui.closing import CloseWatch
 
         self._watch = CloseWatch(host.main_window(), self._closing)
         from silo.workbench.revisions.dock import ProjectDock
@@ -131,7 +132,7 @@ class AddOn:
             self.commits.finish()
 
     def _end(self) -> None:
-        from silo.workbench.gui.widgets import wait_for_disk
+        from silo.workbench.gui.closing import wait_for_disk
 
         self.session.close(wait_for_disk)
 
@@ -142,7 +143,8 @@ class AddOn:
         """Make the session, which does the work beside the GUI thread."""
         from silo.workbench.session.session import Session
         from silo.workbench.session.state import Listener
-        from silo.workbench.settings.server import Keyring, read_known
+        from silo.workbench.settings.keyring import Keyring
+        from silo.workbench.settings.server import read_known
 
         def drawing() -> list[str]:
             from silo.workbench.freecad.drawer import command
@@ -190,7 +192,7 @@ class AddOn:
     @cached_property
     def projects(self) -> ProjectFlow:
         """Make the flow of the project view."""
-        from silo.workbench.revisions.flow import ProjectFlow
+        from silo.workbench.revisions.project import ProjectFlow
 
         return ProjectFlow(self.session, self.preferences, self.commits, self.desk, self.revisions)
 
@@ -399,6 +401,6 @@ class AddOn:
 
     def show_help(self) -> None:
         """Show the add-on's page of the documentation."""
-        from silo.workbench.settings.page import HelpWindow
+        from silo.workbench.settings.help import HelpWindow
 
         HelpWindow(host.main_window()).show()

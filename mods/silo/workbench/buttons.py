@@ -156,7 +156,7 @@ class Buttons:
 
 def _install() -> None:
     from silo import FREECAD_PACKAGES
-    from silo.workbench.settings.page import show_install
+    from silo.workbench.settings.install import show_install
 
     show_install(tuple(FREECAD_PACKAGES))
 

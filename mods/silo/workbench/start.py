@@ -67,7 +67,7 @@ def start() -> None:
     words.use(host.translate)
     host.add_resources(RESOURCES)
     if missing := missing_packages():
-        from silo.workbench.settings.page import InstallDock, stub_commands
+        from silo.workbench.settings.install import InstallDock, stub_commands
 
         host.error(packages_hint(missing, host.packages_folder(), sys.version_info[:2]))
         host.gui().addWorkbench(silo_workbench(Names(stub_commands(missing)), [INSTALL], [INSTALL]))

@@ -15,7 +15,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from silo.drawing.page import LinkView, ellipsoid, inertia_ellipsoid, shaded, views_of, write_glb
+from silo.drawing import shaded
+from silo.drawing.page import LinkView, ellipsoid, inertia_ellipsoid, views_of, write_glb
 from silo.inertia.assembly import Assembly, Instance, Prototype
 from silo.inertia.geometry import Mesh
 from silo.inertia.geometry.together import mesh_volume

@@ -14,7 +14,8 @@ from desk import Document, Office, PreviewWindow
 from silo.bom.errors import DocumentError, InputError, UnreachableError
 from silo.bom.findings import Finding, FindingCode, Severity
 from silo.workbench.commit.flow import CommitFlow
-from silo.workbench.preview.flow import PreviewFlow, PreviewRow, rows
+from silo.workbench.preview.flow import PreviewFlow
+from silo.workbench.preview.rows import PreviewRow, rows
 
 
 @pytest.fixture(name="shown")

@@ -24,7 +24,8 @@ from silo.cli.reading import read_assembly
 from silo.registering.closed_files import proposals_for, register_all
 from silo.testing import FakeSilo
 from silo.workbench.documents.snapshot import Snapshot
-from silo.workbench.preview.flow import Preview, PreviewRow, RowKind, ask, rows, summary, to_sync
+from silo.workbench.preview.comparison import Preview, ask, to_sync
+from silo.workbench.preview.rows import PreviewRow, RowKind, rows, summary
 from silo.workbench.session.worker import Control
 from silo_server.run import running_server
 

@@ -10,7 +10,8 @@ import pytest
 from silo.bom.entry import BomEntry, Extraction
 from silo.testing import FakeSilo
 from silo.workbench.documents.snapshot import Snapshot
-from silo.workbench.preview.flow import MOST_ROWS, PreviewRow, RowKind, ask, rows
+from silo.workbench.preview.comparison import ask
+from silo.workbench.preview.rows import MOST_ROWS, PreviewRow, RowKind, rows
 from silo.workbench.session.worker import Control
 
 

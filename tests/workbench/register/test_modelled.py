@@ -17,7 +17,7 @@ from silo.registering.carry_out import carry_out
 from silo.registering.journal import Journal
 from silo.registering.offer import offer
 from silo.testing import FakeSilo
-from silo.workbench.register.flow import APART, NEW, EditedRow, choose, heading
+from silo.workbench.register.rows import APART, NEW, EditedRow, choose, heading
 from silo.workbench.session.worker import Control
 
 

@@ -10,7 +10,7 @@ from silo.bom.items.proposal import Proposal
 from silo.bom.items.schema import Categories
 from silo.registering.candidate import Candidate, ComponentState, Similar
 from silo.registering.offer import Offer
-from silo.workbench.register.flow import (
+from silo.workbench.register.rows import (
     ASK,
     NEW,
     SAME,

@@ -15,7 +15,8 @@ from silo.api.files import Origin
 from silo.bom.errors import UnreachableError
 from silo.workbench.colleagues.theirs import Choice
 from silo.workbench.commit.flow import CommitFlow
-from silo.workbench.revisions.flow import ProjectFlow, ProjectView, RevisionFlow, file_in_project
+from silo.workbench.revisions.flow import RevisionFlow
+from silo.workbench.revisions.project import ProjectFlow, ProjectView, file_in_project
 
 
 @dataclass

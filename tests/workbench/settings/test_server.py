@@ -12,7 +12,7 @@ from desk import Group
 
 from silo.api.address import same_server
 from silo.bom.errors import ConfigError
-from silo.workbench.settings import DEFAULTS, Preferences
+from silo.workbench.settings.preferences import DEFAULTS, Preferences
 from silo.workbench.settings.server import (
     ServerChoice,
     ServerPreferences,

@@ -6,7 +6,7 @@ from __future__ import annotations
 import pytest
 
 from silo.bom.errors import ConfigError
-from silo.workbench.settings.server import SERVICE, Keyring
+from silo.workbench.settings.keyring import SERVICE, Keyring
 
 URL = "https://silo.example.com"
 

@@ -13,6 +13,7 @@ from silo.workbench.colleagues.theirs import Choice, Theirs, choice_texts, line_
 from silo.workbench.commit.desk import CommitAnswer
 from silo.workbench.commit.plan import CommitPlan, DocumentRow, DocumentState
 from silo.workbench.gui import widgets
+from silo.workbench.gui.choices import choice_box
 from silo.workbench.gui.qt import QShortcut, QtCore, QtGui, QtWidgets
 from silo.workbench.tone import Tone
 from silo.workbench.words import counted, plain, tip, told_apart, translate
@@ -203,7 +204,7 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
             more.setObjectName(f"more{number}")
             self.files.setItemWidget(child, 1, more)
         item.setExpanded(True)
-        box = widgets.choice_box(None, choice_texts(), name=f"choice{number}")
+        box = choice_box(None, choice_texts(), name=f"choice{number}")
         box.currentIndexChanged.connect(lambda _index: self._chose(number, box))
         self._choices[number] = box
         self.files.setItemWidget(item, _CHOICE, box)

@@ -34,7 +34,7 @@ from silo.workbench.commit.take import CommittedDocument, take_each
 from silo.workbench.desk import is_edited
 from silo.workbench.documents.snapshot import Snapshot
 from silo.workbench.session.session import Session
-from silo.workbench.settings import ALLOW, Preferences
+from silo.workbench.settings.preferences import ALLOW, Preferences
 from silo.workbench.tone import Tone
 from silo.workbench.words import translate
 

@@ -59,7 +59,7 @@ def _save(doc: Any) -> None:
         doc.save()
     else:
         # In 0.20 only FreeCAD's own save takes the mark of unsaved edits away.
-        from silo.workbench.gui.widgets import save_in_view
+        from silo.workbench.gui.save_in_view import save_in_view
 
         save_in_view(doc)
 

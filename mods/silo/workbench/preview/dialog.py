@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from silo.bom.errors import SiloError
 from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QtCore, QtWidgets
-from silo.workbench.preview.flow import MOST_CELL, MOST_ROWS, Preview, PreviewRow, RowKind, rows, summary
+from silo.workbench.preview.comparison import Preview
+from silo.workbench.preview.rows import MOST_CELL, MOST_ROWS, PreviewRow, RowKind, rows, summary
 from silo.workbench.tone import Tone
 from silo.workbench.words import counted, plain, spoken, tip, translate
 

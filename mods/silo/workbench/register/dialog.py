@@ -13,9 +13,9 @@ from silo.registering.items import Registration
 from silo.registering.offer import Offer
 from silo.registering.request import RegistrationRequest
 from silo.workbench.gui import widgets
+from silo.workbench.gui.choices import KEY, ChoiceDelegate, choice_box, chosen_key, fill_choices
 from silo.workbench.gui.qt import QShortcut, QtCore, QtGui, QtWidgets
-from silo.workbench.gui.widgets import KEY, ChoiceDelegate, chosen_key
-from silo.workbench.register.flow import (
+from silo.workbench.register.rows import (
     APART,
     NEW,
     SAME,
@@ -136,7 +136,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
     def _make_filters(self) -> Any:
         self.words = widgets.field("words", translate("Silo", "Filter"), clear=True)
         self.words.textChanged.connect(lambda _text: self._filter())
-        self.only = widgets.choice_box(None, filter_words())
+        self.only = choice_box(None, filter_words())
         self.only.activated.connect(lambda _number: self._filter())
         texts = {
             "all": translate("Silo", "Check All"),
@@ -152,9 +152,9 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
     def _make_bulk(self) -> Any:
         """Make the row of buttons that set one value for all chosen rows."""
         self.bulk: dict[str, Any] = {
-            "sourcing": widgets.choice_box(None, self._sources),
-            "category": widgets.choice_box(None, {}, search=True),
-            "item_type": widgets.choice_box(None, self._types),
+            "sourcing": choice_box(None, self._sources),
+            "category": choice_box(None, {}, search=True),
+            "item_type": choice_box(None, self._types),
         }
         hints = {
             "sourcing": translate("Silo", "Source…"),
@@ -221,7 +221,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
             code: f"{code} {plain(offer.categories[code], 60)}".strip()
             for code in dict.fromkeys((*offer.recent, *offer.categories))
         }
-        widgets.fill_choices(self.bulk["category"], self._categories)
+        fill_choices(self.bulk["category"], self._categories)
         self._reset(self.bulk["category"])
         self._drawn.clear()
         candidates = grouped(offer.candidates[:MOST_ROWS])

@@ -12,17 +12,11 @@ from silo.bom.errors import SiloError
 from silo.workbench.colleagues.theirs import Choice, Theirs, choice_texts, more_text
 from silo.workbench.freecad import host
 from silo.workbench.gui import widgets
+from silo.workbench.gui.choices import choice_box, fill_choices
 from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets, run_dialog
-from silo.workbench.revisions.flow import (
-    ItemHistory,
-    ProjectFlow,
-    ProjectRow,
-    ProjectView,
-    RevisionFlow,
-    file_in_project,
-    left_alone,
-    over_edits,
-)
+from silo.workbench.revisions.flow import ItemHistory, RevisionFlow
+from silo.workbench.revisions.project import ProjectFlow, ProjectRow, ProjectView, file_in_project
+from silo.workbench.revisions.pulled import left_alone, over_edits
 from silo.workbench.tone import Tone
 from silo.workbench.words import plain, spoken, tip, told_apart, translate
 
@@ -363,7 +357,7 @@ def ask_choices(parent: Any, files: Sequence[Theirs]) -> list[tuple[Theirs, Choi
         item = QtWidgets.QTreeWidgetItem([plain(os.path.basename(theirs.path), 80), theirs.headline])
         item.setToolTip(0, tip(theirs.path))
         tree.addTopLevelItem(item)
-        boxes.append(widgets.choice_box(None, choice_texts()))
+        boxes.append(choice_box(None, choice_texts()))
         tree.setItemWidget(item, 2, boxes[-1])
     for column in range(2):
         tree.resizeColumnToContents(column)
@@ -385,7 +379,7 @@ class ProjectPane(QtWidgets.QWidget):  # type: ignore[misc]  # PySide has no typ
         super().__init__()
         self._flow = flow
         layout = QtWidgets.QVBoxLayout(self)
-        self.root = widgets.choice_box(None, {}, name="root")
+        self.root = choice_box(None, {}, name="root")
         self.root.activated.connect(lambda _number: self._choose(str(self.root.currentData() or "")))
         self.root.setSizePolicy(QtWidgets.QSizePolicy.Policy.Ignored, QtWidgets.QSizePolicy.Policy.Preferred)
         browse = widgets.button("…", "choose", self._browse, translate("Silo", "Choose the project's folder"))
@@ -416,7 +410,7 @@ class ProjectPane(QtWidgets.QWidget):  # type: ignore[misc]  # PySide has no typ
         roots = self._flow.roots()
         if self._flow.view.root:
             roots = list(dict.fromkeys((self._flow.view.root, *roots)))
-        widgets.fill_choices(self.root, told_apart(roots))
+        fill_choices(self.root, told_apart(roots))
         self.root.setToolTip(tip(roots[0]) if roots else "")
         self._draw()
         if roots:

@@ -11,7 +11,7 @@ from silo.workbench.words import translate
 
 if TYPE_CHECKING:
     from silo.workbench.revisions.dialog import ProjectPane
-    from silo.workbench.revisions.flow import ProjectFlow
+    from silo.workbench.revisions.project import ProjectFlow
 
 
 PROJECT = "Silo Project"
@@ -21,7 +21,7 @@ class ProjectDock(Dock):
     """The project view.
 
     flow
-        gives :class:`silo.workbench.revisions.flow.ProjectFlow`, when it is first needed.
+        gives :class:`silo.workbench.revisions.project.ProjectFlow`, when it is first needed.
     """
 
     def __init__(self, window: Any, flow: Callable[[], ProjectFlow]) -> None:

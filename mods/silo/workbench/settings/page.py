@@ -1,44 +1,23 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The page in FreeCAD's preferences: server, token, TLS, and what a commit does.
-
-Where FreeCAD's Python lacks packages, the add-on is a workbench with one button that installs them.
-
-The add-on's page of the documentation, in a window: it needs no browser and no network.
-"""
+"""The page in FreeCAD's preferences: server, token, TLS, and what a commit does."""
 
 from __future__ import annotations
 
 import os
-import sys
-import threading
 import time
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from silo.workbench.commands import INSTALL, Command
-from silo.workbench.freecad import host
 from silo.workbench.gui import qt, widgets
-from silo.workbench.gui.dock import Dock
-from silo.workbench.gui.qt import QtCore, QtWidgets, Relay
-from silo.workbench.packages import missing_packages, packages_hint
-from silo.workbench.pane.dock import NAME
+from silo.workbench.gui.choices import choice_box
+from silo.workbench.gui.qt import QtCore, QtWidgets
 from silo.workbench.session.session import Session
-from silo.workbench.settings import ALLOW, HOLD, Preferences
-from silo.workbench.settings.server import (
-    Keyring,
-    ServerChoice,
-    ServerPreferences,
-    begin_login,
-    in_use,
-    is_let_in,
-    keep_token,
-    look,
-    read_known,
-    test,
-)
+from silo.workbench.settings.connection_test import begin_login, in_use, is_let_in, keep_token, look, test
+from silo.workbench.settings.keyring import Keyring
+from silo.workbench.settings.preferences import ALLOW, HOLD, Preferences
+from silo.workbench.settings.server import ServerChoice, ServerPreferences, read_known
 from silo.workbench.tone import Tone
-from silo.workbench.words import QT_TRANSLATE_NOOP, spoken, translate, visible
+from silo.workbench.words import spoken, translate
 
 if TYPE_CHECKING:
     from silo.api.client import BrowserLogin
@@ -88,7 +67,7 @@ class PreferencePage:
         log_in = widgets.button(translate("Silo", "Log in…"), "log_in", self.log_in)
         form.addRow(translate("Silo", "API token"), widgets.line(self.token, log_in))
         places = {PREFERENCE: translate("Silo", "FreeCAD's preferences (a plain file)")}
-        self.place = widgets.choice_box(None, places, name="place")
+        self.place = choice_box(None, places, name="place")
         form.addRow(translate("Silo", "Keep the token in"), self.place)
         self.verify = QtWidgets.QCheckBox(translate("Silo", "Check the server's certificate"))
         self.verify.setObjectName("verify")
@@ -130,7 +109,7 @@ class PreferencePage:
             HOLD: translate("Silo", "hold the BOM back until they are mended"),
             ALLOW: translate("Silo", "sync without them (they become unreferenced)"),
         }
-        self.missing = widgets.choice_box(None, ways, name="missing")
+        self.missing = choice_box(None, ways, name="missing")
         form.addRow(translate("Silo", "Where links are broken"), self.missing)
         self.schema = widgets.field("schema")
         form.addRow(translate("Silo", "Part number schema"), self.schema)
@@ -295,143 +274,3 @@ def _breathe() -> None:
     # FreeCAD's preference window, when a Python command opens it, keeps Python's lock for as long as it is
     # open (measured, 0.20 to 1.1), so no worker could continue; sleeping releases the lock.
     time.sleep(0.003)
-
-
-PAGE = Path(__file__).resolve().parents[4] / "docs" / "addon.md"
-
-
-class HelpWindow(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
-    """Not modal: one reads it beside the work."""
-
-    def __init__(self, parent: Any) -> None:
-        super().__init__(parent)
-        layout = widgets.lay_out(self, "SiloHelp", translate("Silo", "Help on Silo"), 820, 700)
-        self.page = QtWidgets.QTextBrowser()
-        self.page.setOpenExternalLinks(True)
-        self.page.setSearchPaths([str(PAGE.parent)])
-        self.page.setMarkdown(_text())
-        layout.addWidget(self.page)
-
-
-def _text() -> str:
-    try:
-        return PAGE.read_text(encoding="utf-8")
-    except OSError:
-        return translate("Silo", "The documentation is not there: {path}", path=PAGE)
-
-
-# The one window; FreeCAD holds no reference to it.
-_open: list[Any] = []
-
-
-def stub_commands(missing: Sequence[str]) -> dict[str, Command]:
-    """Make the one command that works without packages."""
-
-    return {
-        INSTALL: Command(
-            text=QT_TRANSLATE_NOOP("Silo_InstallPackages", "Install What Silo Needs…"),
-            tip=QT_TRANSLATE_NOOP("Silo_InstallPackages", "Install the Python packages that Silo needs"),
-            icon="silo",
-            run=lambda: show_install(missing),
-        )
-    }
-
-
-def show_install(missing: Sequence[str]) -> None:
-    """Open the window that installs packages."""
-    window = InstallWindow(missing, host.main_window(), install)
-    _open[:] = [window]
-    window.show()
-
-
-class InstallDock(Dock):
-    """The pane while packages are missing: which, and the button that installs them."""
-
-    def __init__(self, window: Any, missing: Sequence[str]) -> None:
-        super().__init__(window, NAME, translate("Silo", "Database Activity"))
-        self._missing = missing
-        self.show()
-
-    def make(self) -> Any:
-        """Make the widget with the sentence and its button."""
-        content = QtWidgets.QWidget()
-        layout = QtWidgets.QVBoxLayout(content)
-        text = translate("Silo", "Silo cannot start yet: FreeCAD's Python lacks {names}.")
-        layout.addWidget(widgets.label(text.replace("{names}", ", ".join(self._missing)), Tone.WARNING))
-        text = translate("Silo", "Install What Silo Needs…")
-        layout.addWidget(widgets.button(text, "mend", lambda: show_install(self._missing)))
-        layout.addStretch(1)
-        return content
-
-
-def install() -> str:
-    """Install the packages for this FreeCAD, and return their folder. Raises SiloError. Worker."""
-    from silo.freecads.addon import ask_freecad, install_packages
-
-    return install_packages(ask_freecad(host.program(), Path(host.user_data_folder())))
-
-
-class InstallWindow(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
-    """Says what is missing, installs it, and says how that went.
-
-    install
-        does the work in a thread of its own; returns the folder, raises with the reason.
-    """
-
-    def __init__(self, missing: Sequence[str], parent: Any, install: Callable[[], str]) -> None:
-        super().__init__(parent)
-        self._install = install
-        self._relay = Relay()
-        title = translate("Silo", "Install what Silo needs")
-        layout = widgets.lay_out(self, "SiloInstall", title, 460, 120)
-        # The work may end after the window is closed; then it comes back and says how that went.
-        self.setAttribute(QtCore.Qt.WidgetAttribute.WA_DeleteOnClose, False)
-        text = translate(
-            "Silo",
-            "Silo needs these Python packages: {names}.\nThey are installed in {folder}.",
-            names=", ".join(missing),
-            folder=host.packages_folder(),
-        )
-        self.text = widgets.label(text)
-        self.bar = QtWidgets.QProgressBar()
-        self.bar.setRange(0, 0)
-        self.bar.hide()
-        self.button = widgets.button(translate("Silo", "Install"), "install", self.begin, default=True)
-        close = widgets.button(translate("Silo", "Close"), "close", self.close)
-        layout.addWidget(self.text)
-        layout.addWidget(self.bar)
-        layout.addLayout(widgets.line(None, self.button, close))
-
-    def begin(self) -> None:
-        """Install in a thread; the window stays usable, and may be closed."""
-        self.button.setEnabled(False)
-        self.bar.show()
-        self.text.setText(translate("Silo", "Installing. This takes a minute or two…"))
-        threading.Thread(target=self._work, name="silo-install", daemon=True).start()
-
-    def _work(self) -> None:
-        try:
-            text, done = self._install(), True
-        except Exception as error:  # noqa: BLE001  # a person wants to read it, whatever it is
-            text, done = str(error) or type(error).__name__, False
-        self._relay.post(lambda: self._ended(text, done=done))
-
-    def _ended(self, text: str, *, done: bool) -> None:
-        self.bar.hide()
-        self.show()
-        if done:
-            self.text.setText(
-                translate(
-                    "Silo", "The packages are in {folder}. Start FreeCAD again to use Silo.", folder=text
-                )
-            )
-            self.button.hide()
-            return
-        self.button.setEnabled(True)
-        self.button.setText(translate("Silo", "Try again"))
-        by_hand = packages_hint(missing_packages(), host.packages_folder(), sys.version_info[:2])
-        self.text.setText(
-            visible(translate("Silo", "They could not be installed: {reason}", reason=spoken(text)), 1500)
-            + "\n\n"
-            + spoken(by_hand)
-        )
