@@ -19,7 +19,7 @@ from fcstd_writer import Doc, locals_, part
 from silo.bom.errors import InputError
 from silo.cli.progress import ProgressPrinter
 from silo.fcstd import Library
-from silo.vault.plan import NAME, only_job
+from silo.vault.job import NAME, only_job
 
 
 def busy(status: int, after: str) -> Fault:
@@ -115,7 +115,7 @@ def test_a_second_job_on_one_folder_says_who_holds_it(
 def test_what_a_killed_job_left_behind_holds_nothing(tmp_path: Path) -> None:
     """The lock is the system's, not the file."""
     code = (
-        "import os, sys; from silo.vault.plan import only_job\n"
+        "import os, sys; from silo.vault.job import only_job\n"
         "with only_job(sys.argv[1]): os.kill(os.getpid(), 9)"
     )
     assert subprocess.run([sys.executable, "-c", code, tmp_path], check=False).returncode == -signal.SIGKILL

@@ -18,7 +18,8 @@ from silo.files import documents_in
 from silo.registering.closed_files import whole_folder
 from silo.vault.index import Index
 from silo.vault.plan import make_plan
-from silo.vault.reading import Question, VaultReader
+from silo.vault.questions import Question
+from silo.vault.reading import VaultReader
 
 # Per assembly what it links to: a part, a screw of the library, or an assembly after it.
 LINKS = st.lists(

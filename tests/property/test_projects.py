@@ -35,8 +35,17 @@ from silo.outbox.send import send_all
 from silo.outbox.store import Store
 from silo.registering.closed_files import proposals_for, register_all
 from silo.testing import FakeSilo
-from silo.vault.project import Belonging, commits, compare, find_project, keep, name_documents, read_project
-from silo.vault.pull import fetched, place
+from silo.vault.project import (
+    Belonging,
+    commits,
+    compare,
+    find_project,
+    keep,
+    name_documents,
+    read_project,
+)
+from silo.vault.pull import place
+from silo.vault.tree import fetched
 
 PROJECTS = {
     "alarm_clock/parts": 20,

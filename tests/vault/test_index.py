@@ -29,8 +29,10 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 
 from silo.bom.errors import InputError
 from silo.fcstd.contents import FileContents
-from silo.vault.index import Index, SeenFile, StoredAnswer
-from silo.vault.reading import Question, VaultReader, WalkSession
+from silo.vault.answers import SeenFile, StoredAnswer
+from silo.vault.index import Index
+from silo.vault.questions import Question, WalkSession
+from silo.vault.reading import VaultReader
 
 HOUR_NS = 3600 * 10**9
 NAMES = tuple(f"{folder}{name}.FCStd" for folder in ("", "sub/") for name in ("a", "b", "c", "d"))

@@ -28,8 +28,11 @@ from silo.fcstd import Library
 from silo.files import documents_in
 from silo.testing import FakeSilo
 from silo.vault.index import Index
-from silo.vault.plan import SyncJob, make_plan
-from silo.vault.reading import Pool, Question, VaultReader, pool_of, work
+from silo.vault.job import SyncJob
+from silo.vault.plan import make_plan
+from silo.vault.pool import Pool, pool_of
+from silo.vault.questions import Question, work
+from silo.vault.reading import VaultReader
 
 
 def write(folder: Path, silo: FakeSilo | None, assemblies: dict[int, dict[int, int]], parts: int = 4) -> None:

@@ -25,7 +25,9 @@ from silo.outbox.entry import Commit
 from silo.outbox.send import send_all
 from silo.outbox.store import Store
 from silo.testing import FakeSilo
-from silo.vault.pull import Pulled, PullState, RevisionBoms, Rules, fetched, lay_out, place, words
+from silo.vault.pull import Pulled, PullState, Rules, lay_out, place
+from silo.vault.revisions import RevisionBoms, words
+from silo.vault.tree import fetched
 
 
 def assembly(identity: str, *links: tuple[str, str, int]) -> Doc:

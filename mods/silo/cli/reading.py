@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 def reading_of(args: argparse.Namespace) -> Iterator[VaultReader]:
     """Yield a reader of files with the options of the command."""
     from silo.vault.index import Index, default_path
-    from silo.vault.reading import VaultReader, pool_of
+    from silo.vault.pool import pool_of
+    from silo.vault.reading import VaultReader
 
     given = getattr(args, "index", None)
     path = None if getattr(args, "no_cache", False) else given or default_path()
@@ -61,7 +62,7 @@ def read_tops(args: argparse.Namespace) -> list[Extraction]:
 
     Reads each assembly of the file if all are asked for, else one.
     """
-    from silo.vault.reading import Question
+    from silo.vault.questions import Question
 
     names = [None if args.assembly == EACH else args.assembly]
     tops = []

@@ -52,7 +52,7 @@ def whole_folder(
     plan: Plan, reading: VaultReader, base: str, *, hardware: bool = True
 ) -> tuple[Extraction, frozenset[str]]:
     """Read all components of a folder's assemblies, and the files that no assembly uses."""
-    from silo.vault.reading import Question
+    from silo.vault.questions import Question
 
     entries: dict[tuple[str, str], BomEntry] = {}
     findings: list[Finding] = []

@@ -8,240 +8,33 @@ index, the worst is that something is computed once more.
 
 The rules of this module:
 
-* a file is unchanged where size, inode, time of modification and time of change are those of the look that
-  read it, and both times lie well before that look: a file system's clock has ticks, and two changes in one
-  tick look like one. Else its content is compared;
 * content is the packed ``Document.xml`` with the container's directory, which has a checksum of every entry;
 * a row has a checksum; a row that fails it is not there;
-* code that reads otherwise asks under another name (``ENGINE``), so an update never meets old answers;
-* a database that is damaged is made again (:mod:`silo.vault.index`). Where nothing can be written the
-  answers live in memory. Nothing here makes a run fail.
-
-The SQLite file of the index, which several processes may use, and which may be lost at any time.
-
-A database that is damaged or of another format is made again; one that cannot be written is left alone.
-Nothing here makes a run fail.
-
-Answers about files, and the trail of each: all that it depends on.
+* code that reads otherwise asks under another name (:func:`engine`), so an update never meets old answers;
+* where nothing can be written the answers live in memory. Nothing here makes a run fail.
 """
 
 from __future__ import annotations
 
 import json
-import logging
 import os
-import sqlite3
 import stat
 import time
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from functools import cache
 from hashlib import blake2b, sha256
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
 from zlib import crc32
 
 import silo.bom
 import silo.fcstd
-from silo.bom.errors import InputError
-from silo.fcstd.container import FileState
-from silo.fcstd.contents import Content, FileContents
+from silo.fcstd.contents import FileContents
 from silo.fcstd.errors import FcstdError
-from silo.fcstd.facts import FileFacts, Remembered
-from silo.fcstd.library import Library
-from silo.locator import FoundFile, Locator, NotFound
-from silo.platform import cache_folder, hold_lock, remove_patiently
-
-log = logging.getLogger("silo.vault")
-
-_APPLICATION = 0x51107A11  # marks our databases (SQLite's application_id)
-_MAGIC = b"SQLite format 3\0"
-_BUSY_S = 10.0
-_VARIABLES = 250  # of one statement; SQLite takes at least 999
-
-_TABLES = """
-CREATE TABLE files (path TEXT PRIMARY KEY, seen TEXT NOT NULL, mark INTEGER NOT NULL) WITHOUT ROWID;
-CREATE TABLE facts (path TEXT PRIMARY KEY, facts TEXT NOT NULL, mark BLOB NOT NULL);
-CREATE TABLE answers (
-    path TEXT NOT NULL, question TEXT NOT NULL, answer TEXT NOT NULL, trail TEXT NOT NULL,
-    made_at REAL NOT NULL, mark INTEGER NOT NULL, PRIMARY KEY (path, question)
-);
-CREATE TABLE told (vault TEXT, sentence BLOB, PRIMARY KEY (vault, sentence)) WITHOUT ROWID;
-CREATE TABLE places (vault TEXT, uuid TEXT, path TEXT, PRIMARY KEY (vault, uuid, path)) WITHOUT ROWID;
-"""
-
-
-class IndexDatabase:
-    """A database at a path; None for one of this process alone.
-
-    given
-        the user named this path: a file that is no index of ours is not touched (InputError).
-    trouble
-        why nothing is kept, "" where all is well.
-    writes
-        False once writing failed.
-    """
-
-    def __init__(self, path: Path | None, given: bool) -> None:
-        self.path = path
-        self.trouble = ""
-        self.writes = True
-        self._guard: BinaryIO | None = None
-        self._database = _empty()
-        if path is not None:
-            try:
-                self._open(path, given)
-            except InputError:
-                self.close()
-                raise
-
-    def close(self) -> None:
-        """Let others rebuild the database."""
-        self._database.close()
-        if self._guard is not None:
-            self._guard.close()
-
-    def select(self, statement: str, *values: str) -> list[Any]:
-        """Return the rows; [] if the database fails."""
-        try:
-            return self._database.execute(statement, values).fetchall()
-        except sqlite3.Error as error:
-            self._give_up(error)
-            return []
-
-    def select_in(self, statement: str, paths: Sequence[str], *values: str) -> Iterator[Any]:
-        """Yield rows whose path is one of these; ``statement`` ends with ``IN``."""
-        for at in range(0, len(paths), _VARIABLES):
-            group = paths[at : at + _VARIABLES]
-            marks = ",".join("?" * len(group))
-            yield from self.select(f"{statement} ({marks})", *values, *group)
-
-    def write(self, *changes: tuple[str, Sequence[tuple[Any, ...]]]) -> bool:
-        """Carry out statements, each for its rows, all or nothing. Returns True if that succeeded."""
-        if not self.writes:
-            return False
-        try:
-            self._database.execute("BEGIN IMMEDIATE")
-            try:
-                for statement, rows in changes:
-                    self._database.executemany(statement, rows)
-                self._database.execute("COMMIT")
-            except BaseException:
-                if self._database.in_transaction:
-                    self._database.execute("ROLLBACK")
-                raise
-        except sqlite3.Error as error:
-            self._give_up(error)
-            return False
-        return True
-
-    def _open(self, path: Path, given: bool) -> None:
-        try:
-            if given and not _may_replace(path):
-                raise InputError(
-                    f"{path} is not an index of silo-mod, so it is left as it is. Name another file."
-                )
-            path.parent.mkdir(parents=True, exist_ok=True)
-            for attempt in range(2):
-                self._guard = hold_lock(f"{path}.lock", shared=True)
-                if self._guard is None:
-                    self.trouble = f"the index {path} is being made again by another process"
-                    return
-                try:
-                    database = _connected(path)
-                    self._database.close()
-                    self._database = database
-                    return
-                except _Unusable as error:
-                    log.info("%s: %s; it is made again", path, error)
-                    self._guard.close()
-                    if attempt or not _removed(path):
-                        self.trouble = f"the index {path} cannot be used ({error})"
-                        return
-        except (OSError, sqlite3.Error) as error:
-            self._give_up(error)
-
-    def _give_up(self, error: sqlite3.Error | OSError) -> None:
-        """Stop writing to a database that fails; read from it as long as that works."""
-        if not self.trouble:
-            self.trouble = f"the index {self.path} cannot be used ({error}); nothing is lost but time"
-            log.warning("%s", self.trouble)
-        self.writes = False
-        if isinstance(error, sqlite3.DatabaseError) and not isinstance(error, sqlite3.OperationalError):
-            self._database.close()
-            self._database = _empty()
-            if self._guard is not None and self.path is not None:
-                self._guard.close()
-                self._guard = None
-                _removed(self.path)
-
-
-def _empty() -> sqlite3.Connection:
-    """Make a database for this process alone; SQLite moves it to the disk if it grows large."""
-    database = sqlite3.connect("", isolation_level=None)
-    database.executescript(_TABLES)
-    return database
-
-
-class _Unusable(Exception):
-    """The file is no database that this code can use."""
-
-
-def _connected(path: Path) -> sqlite3.Connection:
-    """Open a database of our format, or make it. Raises _Unusable, sqlite3.OperationalError (locked, full, no
-    right).
-    """
-    database = sqlite3.connect(path, timeout=_BUSY_S, isolation_level=None)
-    try:
-        database.execute("PRAGMA synchronous = NORMAL")
-        database.execute("BEGIN IMMEDIATE")
-        (application,) = database.execute("PRAGMA application_id").fetchone()
-        (version,) = database.execute("PRAGMA user_version").fetchone()
-        (tables,) = database.execute("SELECT count(*) FROM sqlite_master").fetchone()
-        if (application, version) == (0, 0) and not tables:
-            for statement in _TABLES.split(";"):
-                database.execute(statement)
-            database.execute(f"PRAGMA application_id = {_APPLICATION}")
-            database.execute(f"PRAGMA user_version = {FORMAT}")
-        elif (application, version) != (_APPLICATION, FORMAT):
-            raise _Unusable(f"it has format {version}, wanted is {FORMAT}")
-        database.execute("COMMIT")
-        return database
-    except sqlite3.OperationalError:
-        database.close()
-        raise
-    except sqlite3.DatabaseError as error:
-        database.close()
-        raise _Unusable(str(error)) from error
-    except _Unusable:
-        database.close()
-        raise
-
-
-def _removed(path: Path) -> bool:
-    """Delete a database that nobody has open; returns True if it is gone."""
-    guard = hold_lock(f"{path}.lock")
-    if guard is None:
-        return False
-    with guard:
-        for name in (path, f"{path}-journal", f"{path}-wal", f"{path}-shm"):
-            remove_patiently(name)
-    return True
-
-
-def _may_replace(path: Path) -> bool:
-    """Return True if the path is free, or holds a database of ours, even if it is damaged behind its head."""
-    try:
-        with path.open("rb") as file:
-            head = file.read(72)
-    except FileNotFoundError:
-        return True
-    ours = head.startswith(_MAGIC) and head[68:72] == _APPLICATION.to_bytes(4, "big")
-    return ours or not head
-
-
-FORMAT = 5
-_ENCODER = json.JSONEncoder(separators=(",", ":"))
-_SETTLED_NS = 2_500_000_000  # FAT has ticks of 2 s, the coarsest in use
+from silo.fcstd.facts import FileFacts
+from silo.locator import Locator
+from silo.platform import cache_folder
+from silo.vault.answers import SeenFile, StoredAnswer, led_to
+from silo.vault.database import FORMAT, IndexDatabase
 
 
 @cache
@@ -253,139 +46,6 @@ def engine() -> str:
             for file in sorted(Path(folder).rglob("*.py")):
                 digest.update(file.name.encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()[:16]
-
-
-class SeenFile(NamedTuple):
-    """A file at the time of a look. ``content`` begins with "!" for a file that could not be read."""
-
-    content: str
-    inode: int
-    size: int
-    modified_ns: int
-    changed_ns: int
-    read_ns: int
-
-    @classmethod
-    def of(cls, content: Content | Remembered) -> SeenFile:
-        """Make the record of a file that was read."""
-        state = content.state
-        return cls(
-            content.digest,
-            state.inode,
-            state.size,
-            state.modified_ns,
-            content.changed_ns,
-            content.read_ns,
-        )
-
-    @classmethod
-    def unread(cls, error: FcstdError) -> SeenFile | None:
-        """Make the record of a file that could not be read, with its state, so that any change counts. None
-        if it has no state.
-        """
-        state = error.state
-        if not isinstance(state, FileState):
-            return None
-        content = f"!{state.inode}:{state.size}:{state.modified_ns}:{error.reason}"
-        return cls(content, state.inode, state.size, state.modified_ns, 0, 0)
-
-    def text(self) -> str:
-        """Write it as a key for the index."""
-        return f"{self.inode} {self.size} {self.modified_ns} {self.changed_ns} {self.read_ns} {self.content}"
-
-    @classmethod
-    def from_text(cls, text: str) -> SeenFile:
-        """Read what :meth:`text` wrote."""
-        *numbers, content = text.split(" ", 5)
-        return cls(content, *map(int, numbers))
-
-    def still(self, status: os.stat_result) -> bool:
-        """Return True if the file certainly has not changed since."""
-        then = (self.inode, self.size, self.modified_ns, self.changed_ns)
-        now = (status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
-        return then == now and max(self.modified_ns, self.changed_ns) + _SETTLED_NS < self.read_ns
-
-
-class StoredAnswer(NamedTuple):
-    """An answer with its trail; it travels between processes and machines.
-
-    answer
-        JSON.
-    trail
-        JSON: [{path: content}, [[folders in which links' paths begin, {recorded path: where it leads}], …]].
-        Left out are links that lead straight to one of the files: they do as long as it lies there. Only the
-        content where nothing was read but the very file that was asked about.
-    seen
-        path → the file when it was read; empty where the answer comes from the index.
-    lasting
-        False where the answer must not be kept: a file was being written, or its state is not known.
-    """
-
-    answer: str
-    trail: str
-    seen: Mapping[str, SeenFile] = {}
-    lasting: bool = True
-
-    @classmethod
-    def found_in(cls, library: Library, answer: Any) -> StoredAnswer:
-        """Make the record of an answer and of the files read for it; the session did nothing else."""
-        seen: dict[str, SeenFile] = {}
-        lasting = True
-        for path, document in library.documents.items():
-            if not isinstance(document, FcstdError):
-                seen[path] = SeenFile.of(document.content)
-            elif (unread := SeenFile.unread(document)) is not None:
-                seen[path] = unread
-            else:
-                lasting = False
-        led: dict[tuple[str, ...], dict[str, str]] = {}
-        for (folders, recorded), location in library.lookups.items():
-            if (
-                isinstance(location, FoundFile)
-                and location.real in seen
-                and location.is_straight(recorded, folders[0])
-            ):
-                continue
-            led.setdefault(folders, {})[recorded] = led_to(location)
-        if len(seen) == 1 and not led:
-            return cls(json_of(answer), next(iter(seen.values())).content, seen, lasting)
-        files = {path: file.content for path, file in seen.items()}
-        return cls(json_of(answer), json_of([files, list(led.items())]), seen, lasting)
-
-    @property
-    def is_of_one_file(self) -> bool:
-        """Return True if only the file in question was read, and no link was followed."""
-        return not self.trail.startswith("[")
-
-    @property
-    def links(self) -> frozenset[str]:
-        """Return the files to which links lead, counted or not; for a missing file the recorded path."""
-        if self.is_of_one_file:
-            return frozenset()
-        files, lookups = json.loads(self.trail)
-        link_paths = frozenset(
-            _target(to) or os.path.normpath(os.path.join(folders[-1], recorded))
-            for folders, led in lookups
-            for recorded, to in led.items()
-        )
-        return link_paths.union(files) - {next(iter(files), "")}
-
-
-def led_to(location: FoundFile | NotFound) -> str:
-    if isinstance(location, NotFound):
-        return f"!{location.code}:{location.detail}"
-    if location.opened == location.real and not location.respelt:
-        return location.real
-    return f"{location.opened}\0{location.real}\0{location.respelt}"
-
-
-def _target(led: str) -> str | None:
-    return None if led.startswith("!") else (led.split("\0") * 2)[1]
-
-
-def json_of(value: Any) -> str:
-    # Escaped: a file's name need not be valid Unicode, and SQLite takes nothing else.
-    return _ENCODER.encode(value)
 
 
 _KEPT_S = 30 * 24 * 3600.0

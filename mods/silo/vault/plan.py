@@ -1,166 +1,28 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """One plan for many files: which assemblies there are, each once, and in which order they are synced.
 
-Every file is asked for its assembly, then for the sub-assemblies that others use and nobody has asked for.
-The plan keeps how the assemblies hang together, not what they hold; that is asked for again, from the index,
-when an assembly's turn comes. So memory grows with the number of files, and little.
-
-A job carries a plan out: it looks everything up at once, compares, and merges what is news, children before
-parents. Requests depend on the number of identities and of changes, not on that of assemblies: identities
-and BOMs are asked for by the thousand. Assemblies that do not depend on each other are merged side by side.
-Whatever ends the job, the next one continues: what was merged agrees then, and is not sent again. There is
-one job at a time on a vault: if its disk carries no locks, the report says what that cannot prevent.
+Every file is asked for its assembly, then for the sub-assemblies that others use and that were not asked for
+yet. The plan keeps how the assemblies hang together, not what they hold; that is asked for again, from the
+index, when an assembly's turn comes. So memory grows with the number of files, and little.
 """
 
 from __future__ import annotations
 
-import os
-import threading
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from hashlib import blake2b
-from pathlib import Path
 from typing import Any
-from uuid import uuid4
 
-from silo.api.policy import ends_run
-from silo.api.wire import SourceDocument
-from silo.batch import SyncOptions, TopResult, source_document, suggest_by_identity
-from silo.bom.compare.states import ComparedAssembly
-from silo.bom.document import relative
 from silo.bom.entry import BomEntry, Extraction
-from silo.bom.errors import CancelledError, DocumentError, InputError, SeveralAssembliesError, SiloError
+from silo.bom.errors import SeveralAssembliesError, SiloError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
-from silo.bom.items.lookup import Known
-from silo.bom.links import MAX_LEVELS, Rings, extract
-from silo.bom.roots import choose_assembly, find_assemblies
+from silo.bom.links import MAX_LEVELS, Rings
 from silo.bom.snapshot import whole_row
 from silo.bom.standard import standard_uuid
-from silo.bom.view.folders import shorten
 from silo.bom.walk.shared_identity import copied_identity
-from silo.bom_sync.resolved import Resolved, blocking, known_items, resolve_known
-from silo.bom_sync.steps import Outcome, Status, SyncApi, plain_lines, sync
-from silo.fcstd import Library
 from silo.fcstd.suggest import with_suggestions
-from silo.files import documents_in
-from silo.folder_lock import folder_lock
-from silo.vault.reading import Question, VaultReader, WalkAnswer, collecting_seldom, grouped
-
-
-@dataclass(frozen=True, slots=True)
-class FolderBoms:
-    """What the files of a folder say. Paths are relative to it.
-
-    unreadable
-        file and reason, for files that could not be read.
-    findings
-        what keeps a BOM from being complete (severity error), each once.
-    """
-
-    base: str
-    assemblies: tuple[ComparedAssembly, ...] = ()
-    unreadable: tuple[tuple[str, str], ...] = ()
-    findings: tuple[Finding, ...] = ()
-
-    @property
-    def complete(self) -> bool:
-        """Return True if every file was read and every BOM is whole."""
-        return not self.unreadable and not self.findings
-
-
-def read_folder(
-    folder: Path | str, *, root: Path | str | None = None, lost: Sequence[tuple[str, str]] = ()
-) -> FolderBoms:
-    """Read all assemblies below a folder. ``root``: no file outside of it is read.
-
-    lost
-        each file that is known to be missing, and the reason.
-
-    Raises InputError if there is no such folder. A file that cannot be read is reported in the result.
-    """
-    base = os.path.realpath(folder)
-    if not os.path.isdir(base):
-        raise InputError(f"{folder} is not a folder. Name a folder of FreeCAD files.")
-    assemblies: dict[tuple[str, str], ComparedAssembly] = {}
-    unreadable = [(relative(os.path.join(root or base, path), base), why) for path, why in lost]
-    findings: dict[Finding, None] = {}
-    with Library(root) as library:
-        for path in _users_first(documents_in([base]), library):
-            try:
-                for extraction in _extractions(library, path, assemblies):
-                    findings.update(
-                        dict.fromkeys(f for f in extraction.findings if f.severity is Severity.ERROR)
-                    )
-                    for assembly in _assemblies(extraction):
-                        assemblies.setdefault(assembly.head.key, assembly)
-            except SiloError as error:
-                unreadable.append((relative(path, base), _without(str(error), base, root)))
-    ordered = sorted(assemblies.values(), key=lambda assembly: assembly.head.key)
-    return FolderBoms(
-        base,
-        tuple(_relative(assembly, base) for assembly in ordered),
-        tuple(unreadable),
-        tuple(replace(finding, message=_without(finding.message, base, root)) for finding in findings),
-    )
-
-
-def _without(message: str, base: str, root: Path | str | None) -> str:
-    """Shorten the paths in a message, also those beside the folder, since the root may be a temporary one."""
-    message = shorten(message, base)
-    if root is None or (top := os.path.realpath(root)) == base:
-        return message
-    return message.replace(top + os.sep, f"{relative(top, base)}/")
-
-
-def _users_first(paths: Sequence[str], library: Library) -> list[str]:
-    """Put files to which no other links first, so that the files that they use are walked once, as part of
-    them.
-    """
-    used: set[str] = set()
-    for path in paths:
-        with suppress(SiloError):  # reported when it is read
-            used.update(os.path.basename(recorded).lower() for recorded in library.open(path).linked())
-    return sorted(paths, key=lambda path: os.path.basename(path).lower() in used)
-
-
-def _extractions(
-    library: Library, path: str, assemblies: dict[tuple[str, str], ComparedAssembly]
-) -> Iterator[Extraction]:
-    """Yield the BOMs of a file's assemblies, but not those that were read as part of another one."""
-    document = library.open(path)
-    for top in _tops(document):
-        if (document.FileName, top.Name) not in assemblies:
-            yield extract(top)
-
-
-def _tops(document: Any) -> Iterable[Any]:
-    try:
-        return (choose_assembly(document),)
-    except InputError:  # if several are equally likely, all of them count here
-        return find_assemblies(document)
-
-
-def _assemblies(extraction: Extraction) -> Iterator[ComparedAssembly]:
-    """Yield the assembly itself and every sub-assembly below it that has lines."""
-    seen: set[int] = set()
-    stack = [(extraction.assembly, extraction.entries)]
-    while stack:
-        head, lines = stack.pop()
-        if lines and id(lines) not in seen:
-            seen.add(id(lines))
-            yield ComparedAssembly(replace(head, children=(), quantity=1, level=0), tuple(lines))
-            stack += [(line, line.children) for line in lines]
-
-
-def _relative(assembly: ComparedAssembly, base: str) -> ComparedAssembly:
-    def moved(entry: BomEntry) -> BomEntry:
-        return replace(entry, doc_path=relative(entry.doc_path, base), children=())
-
-    return ComparedAssembly(moved(assembly.head), tuple(moved(line) for line in assembly.lines))
-
+from silo.vault.questions import Question, collecting_seldom
+from silo.vault.reading import VaultReader, WalkAnswer
 
 Key = tuple[str, str]
 
@@ -206,7 +68,7 @@ class Plan:
     spares
         the same of files that hold no components of others, used or not.
     findings, shared
-        what only the whole plan shows: of one assembly, and of none.
+        findings that need the whole plan: by assembly, and general.
     """
 
     tops: list[str] = field(default_factory=list)
@@ -468,7 +330,7 @@ def _find_copies(plan: Plan) -> None:
 
 
 def _tell(plan: Plan, key: Key, code: FindingCode, message: str, where: Iterable[Key]) -> None:
-    places = tuple(sorted({Place(*extraction) for extraction in where}))
+    places = tuple(sorted({Place(*place) for place in where}))
     plan.findings.setdefault(key, []).append(Finding(code, Severity.ERROR, message, places))
 
 
@@ -489,176 +351,3 @@ def _find_meant(plan: Plan, reading: VaultReader) -> None:
     for before, after in zip(findings, with_suggestions(whole).findings, strict=True):
         if after is not before:
             plan._with_suggestion[before] = after
-
-
-NAME = ".silo-sync.lock"
-
-
-@contextmanager
-def only_job(folder: str) -> Iterator[str]:
-    """Keep a second job away from a folder; yields what the lock cannot prevent, "" for nothing.
-
-    Raises InputError with the name of the first job.
-    """
-    with folder_lock(folder, NAME, "synced") as problem:
-        yield problem and (
-            f"{folder} cannot be locked ({problem}): a job of another user or machine is not "
-            "noticed. Two jobs at once cost requests; the BOMs are right anyway."
-        )
-
-
-_AT_ONCE = 500  # assemblies whose BOMs are in memory at one time
-_SENDERS = 4
-Lines = Mapping[str, Sequence[Mapping[str, Any]]]
-_KEPT = ("id", "part_number", "name", "description", "last_sync")
-
-
-@dataclass
-class SyncJob:
-    """One run of a plan.
-
-    base
-        the folder that paths in the results are relative to; "" for that of each file.
-    stop
-        set where the job is interrupted, so that no merge waits for a busy server any more.
-    senders
-        merges that are under way at one time.
-    """
-
-    plan: Plan
-    reading: VaultReader
-    api: SyncApi
-    options: SyncOptions
-    base: str
-    stop: threading.Event = field(default_factory=threading.Event)
-    senders: int = _SENDERS
-
-    def __post_init__(self) -> None:
-        self.stopped: SiloError | None = None
-        self._sent: dict[str, Future[Outcome]] = {}
-
-    def results(self) -> Iterator[TopResult]:
-        """Yield the result of each file as soon as it is known; files that could not be read come first."""
-        for top, error in self.plan.errors.items():
-            yield TopResult(top, self._base(top), error=error)
-        try:
-            items = self._known_items()
-        except SiloError as error:
-            self.stopped = error
-            for top, count in Counter(node.top for node in self.plan.nodes.values()).items():
-                yield TopResult(top, self._base(top), error=error, left=count)
-            return
-        left = Counter(node.top for node in self.plan.nodes.values())
-        done: dict[str, list[Outcome]] = {}
-        for layer in self.plan.layers:
-            for nodes in grouped(layer, _AT_ONCE):
-                for node, outcome in zip(nodes, self._outcomes(nodes, items), strict=True):
-                    done.setdefault(node.top, []).append(outcome)
-                    left[node.top] -= 1
-                    if not left[node.top]:
-                        yield TopResult(node.top, self._base(node.top), outcomes=tuple(done.pop(node.top)))
-
-    def _base(self, top: str) -> str:
-        return self.base or os.path.dirname(os.path.realpath(top))
-
-    def _known_items(self) -> Known:
-        """Look up the items of everything in the plan, and keep what is needed of them."""
-        items = known_items(self.plan.uuids, self.plan.standards.values(), self.api)
-        return {
-            key: {name: item.get(name) for name in _KEPT} for key, item in items.items() if item is not None
-        }
-
-    def _outcomes(self, nodes: Sequence[PlannedAssembly], items: Known) -> list[Outcome]:
-        """Sync assemblies that do not depend on each other."""
-        several = [resolve_known(self.plan.extraction(node, self.reading), items) for node in nodes]
-        numbers = [resolved.assembly.part_number for resolved in several]
-        lines = self._lines([number for number in numbers if number is not None])
-        several = [self._with_suggestion(resolved, lines) for resolved in several]
-        with ThreadPoolExecutor(self.senders, "silo-merge") as pool:
-            asked = []
-            try:
-                for resolved in several:
-                    number = resolved.assembly.part_number
-                    first = self._sent.get(number or "")
-                    # Copies of one file are one item, and one merge.
-                    if first is None or blocking(resolved):
-                        first = pool.submit(self._sync, resolved, lines)
-                        if number is not None and not blocking(resolved):
-                            self._sent[number] = first
-                    asked.append(first)
-                outcomes = [future.result() for future in asked]
-            except BaseException:  # Ctrl-C, also while the first are sent; the senders end what is under way
-                self.stopped = self.stopped or CancelledError("the job was stopped")
-                self.stop.set()
-                raise
-        return [
-            outcome if outcome.resolved is resolved else _as_the_first(resolved, outcome)
-            for resolved, outcome in zip(several, outcomes, strict=True)
-        ]
-
-    def _with_suggestion(self, resolved: Resolved, lines: Lines) -> Resolved:
-        """Add to findings of missing files the file that has the identity known from the last sync."""
-        line = lines.get(resolved.assembly.part_number or "", ())
-        return suggest_by_identity(resolved, [(resolved, line)], self._files_with if self.base else None)
-
-    def _files_with(self, identities: Iterable[str]) -> set[str]:
-        """Return the files of the folder that have one of these identities. All were read; none is read
-        again.
-        """
-        wanted = {identity.lower() for identity in identities}
-        return {path for identity, path in self.plan.places | self.plan.spares if identity in wanted}
-
-    def _lines(self, numbers: Sequence[str]) -> Lines:
-        many = getattr(self.api, "get_boms", None)
-        if self.stopped is not None or many is None or not numbers:
-            return {}
-        try:
-            return {number: plain_lines(answer) for number, answer in many(numbers).items()}
-        except SiloError as error:
-            self._stop_for(error)
-            return {}
-
-    def _sync(self, resolved: Resolved, lines: Lines) -> Outcome:
-        if self.stopped is not None:
-            return Outcome(Status.FAILED, resolved, error=self.stopped)
-        try:
-            outcome = sync(
-                resolved,
-                self.api,
-                sync_id=str(uuid4()),
-                allow_missing=self.options.allow_missing
-                and not any(
-                    finding.code in (FindingCode.CYCLE, FindingCode.TOO_DEEP) for finding in resolved.findings
-                ),
-                dry_run=self.options.dry_run,
-                describe=lambda: self._source(resolved),
-                lines=lines.get(resolved.assembly.part_number or ""),
-            )
-        except SiloError as error:
-            outcome = Outcome(Status.FAILED, resolved, error=error)
-        if outcome.error is not None:
-            self._stop_for(outcome.error)
-        return outcome
-
-    def _source(self, resolved: Resolved) -> SourceDocument:
-        """Describe the file of a BOM that is about to be sent. DocumentError if it changed since it was
-        read.
-        """
-        if not self.reading.index.untouched(resolved.assembly.doc_path):
-            raise DocumentError(
-                resolved.assembly.doc_path, "it was changed while the job ran; the next run takes it"
-            )
-        return source_document(resolved.assembly)
-
-    def _stop_for(self, error: SiloError) -> None:
-        """End the job for an error that concerns every request; the remaining assemblies get it as their
-        error.
-        """
-        if self.stopped is None and ends_run(error, self.api):
-            self.stopped = error
-
-
-def _as_the_first(resolved: Resolved, first: Outcome) -> Outcome:
-    """Make the outcome of a copy from that of the file that was sent for both."""
-    status = Status.UNCHANGED if first.status is Status.MERGED else first.status
-    return replace(first, resolved=resolved, status=status, result=None)

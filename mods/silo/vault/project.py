@@ -43,7 +43,7 @@ from silo.outbox.entry import SAME_PART, UNKNOWN, Commit, InFile, new_key, on_to
 from silo.outbox.store import Store
 from silo.platform import one_path
 from silo.project_folder import Project, ProjectEntry
-from silo.vault.pull import file_revisions
+from silo.vault.revisions import file_revisions
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient

@@ -4,319 +4,27 @@
 Many questions are answered in two steps, each spread over the executor. First every file is read, once: that
 gives its facts, and the answer where it links to no other. Then the assemblies are walked, with the facts of
 what they link to in place of the files. Answers come back in the order of the questions.
-
-Questions about files, and what a worker does to answer them; its values travel between processes.
-
-A question has a file and a kind: the whole BOM below its assembly, or that one assembly alone. It is answered
-in a session of its own, so that the answer's trail is exactly what the session has read.
-
-Where files are read when they are many: processes of this machine, or a Dask cluster.
 """
 
 from __future__ import annotations
 
-import gc
 import json
-import os
-import threading
-import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import BrokenExecutor, CancelledError, Future
+from dataclasses import dataclass
 from itertools import islice
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 from uuid import uuid4
 
 from silo.bom.entry import Extraction
 from silo.bom.errors import DocumentError, InputError, SeveralAssembliesError, SiloError
-from silo.bom.findings import respelt_findings
-from silo.bom.links import extract
-from silo.bom.roots import choose_assembly
-from silo.bom.snapshot import from_plain, to_plain
-from silo.fcstd.contents import Content, FileContents
-from silo.fcstd.facts import facts_of
-from silo.fcstd.library import Library
-from silo.locator import FoundFile, Locator
-from silo.platform import workers
-from silo.vault.index import Index, StoredAnswer, engine
-
-CHUNK = 64
-
-
-@dataclass(frozen=True, slots=True)
-class Question:
-    """What is asked of a file.
-
-    assembly
-        name or label of the one meant, where the file holds several; None for the likeliest.
-    name_only
-        ``assembly`` is the internal name of any object that may hold components.
-    below
-        the whole tree, or the one assembly alone (:func:`silo.bom.links.extract`).
-    """
-
-    path: str
-    assembly: str | None = None
-    hardware: bool = True
-    below: bool = False
-    name_only: bool = False
-
-    def __post_init__(self) -> None:
-        # Another process, or another run, has another current folder.
-        object.__setattr__(self, "path", os.path.abspath(self.path))
-
-    @property
-    def name(self) -> str:
-        """Return the key for the index."""
-        return _name(self.assembly, self.hardware, self.below, self.name_only)
-
-
-@lru_cache(maxsize=256)
-def _name(assembly: str | None, hardware: bool, below: bool, name_only: bool) -> str:
-    words = ("bom" if below else "level") + ("" if hardware else " without hardware")
-    mark = "#" if name_only else "="
-    return f"{engine()} {words} {'' if assembly is None else mark + assembly}"
-
-
-def collect_seldom() -> None:
-    """Make Python search for reference cycles less often.
-
-    A session takes its own cycles apart. Each search goes through everything that is remembered of a vault,
-    so a document of a large vault would cost more than one of a small vault.
-    """
-    gc.set_threshold(100_000, *gc.get_threshold()[1:])
-
-
-@contextmanager
-def collecting_seldom() -> Iterator[None]:
-    """Do :func:`collect_seldom` during the block."""
-    before = gc.get_threshold()
-    collect_seldom()
-    try:
-        yield
-    finally:
-        gc.set_threshold(*before)
-
-
-class First(NamedTuple):
-    """What reading one file gave.
-
-    known
-        the answer; None where that needs other files.
-    path, facts
-        the file without symlinks, and its facts, "" where there are none.
-    content, folders, linked
-        where there is no answer yet: the file itself, where its links' paths begin, and where they lead.
-    """
-
-    known: StoredAnswer | None
-    path: str = ""
-    facts: str = ""
-    content: Content | None = None
-    folders: tuple[str, ...] = ()
-    linked: Mapping[str, FoundFile] = {}
-
-    @property
-    def files(self) -> list[str]:
-        """Return the file, and the files to which it links."""
-        return [self.path, *(location.real for location in self.linked.values())]
-
-
-@dataclass(frozen=True, slots=True)
-class Supplies:
-    """What is known already of the files that some questions need.
-
-    found
-        (folders in which links' paths begin, where the paths lead), for each file.
-    """
-
-    contents: Mapping[str, Content] = field(default_factory=dict)
-    facts: Mapping[str, str] = field(default_factory=dict)
-    found: Sequence[tuple[tuple[str, ...], Mapping[str, FoundFile]]] = ()
-
-
-class WalkSession:
-    """What a worker keeps between questions."""
-
-    def __init__(self, contents: FileContents | None = None) -> None:
-        self.contents = contents or FileContents()
-        self.locator = Locator(remembers_files=True)
-
-    def ask(self, question: Question, facts: Callable[[str], str] = lambda _path: "") -> StoredAnswer:
-        """Answer a question by reading files; the answer comes with its trail."""
-        library = Library(contents=self.contents, locator=self.locator, facts=facts)
-        try:
-            return StoredAnswer.found_in(library, self._answer(library, question))
-        finally:
-            library.dissolve()
-
-    def read(self, question: Question) -> First:
-        """Read the file of a question, and answer it if no other file is needed."""
-        library = Library(contents=self.contents, locator=self.locator)
-        try:
-            return self._read(library, question)
-        finally:
-            library.dissolve()
-
-    def _read(self, library: Library, question: Question) -> First:
-        path, facts, linked = "", "", dict[str, FoundFile]()
-        try:
-            document = library.open(question.path)
-            path, facts = document.FileName, facts_of(document)
-            for recorded in document.linked():
-                if isinstance(location := self.locator.find(recorded, document.folders), FoundFile):
-                    linked[recorded] = location
-        except DocumentError:
-            pass  # which is the answer
-        else:
-            first = First(None, path, facts, None, document.folders, linked)
-            if set(first.files) != {path} and isinstance(document.content, Content):
-                return first._replace(content=document.content)
-        return First(StoredAnswer.found_in(library, self._answer(library, question)), path, facts)
-
-    def _answer(self, library: Library, question: Question) -> dict[str, Any]:
-        try:
-            document = library.open(question.path)
-            top = document.getObject(question.assembly or "") if question.name_only else None
-            top = choose_assembly(document, question.assembly) if top is None else top
-            extraction = extract(top, hardware=question.hardware, below=question.below)
-            findings = respelt_findings(library.notes, document.FileName)
-            return to_plain(replace(extraction, findings=(*extraction.findings, *findings)))
-        except DocumentError as error:
-            return {"document": [error.path, error.reason]}
-        except SeveralAssembliesError as error:
-            return {"several": [str(error), error.path, error.names]}
-        except InputError as error:
-            return {"input": str(error)}
-
-
-class Done(NamedTuple):
-    """Some questions worked on: what they gave in order, how many files were read, seconds of processor."""
-
-    found: list[First]
-    reads: int
-    seconds: float
-
-
-_mine = threading.local()
-
-
-def work(questions: Sequence[Question], supplies: Supplies | None, run: str) -> Done:
-    """Read the files of questions, or with supplies answer them. Workers run this function.
-
-    run
-        names the run, since what a worker of a cluster keeps from another run may be out of date.
-    """
-    if getattr(_mine, "run", None) != run:
-        _mine.run, _mine.session = run, WalkSession()
-    return work_in(_mine.session, questions, supplies)
-
-
-def work_in(session: WalkSession, questions: Sequence[Question], supplies: Supplies | None) -> Done:
-    """Do what :func:`work` does, in this process."""
-    reads, begin = session.contents.reads, time.thread_time()
-    if supplies is None:
-        firsts = [session.read(question) for question in questions]
-    else:
-        for path, content in supplies.contents.items():
-            session.contents.add(path, content)
-        for folders, locations in supplies.found:
-            session.locator.learn(folders, locations)
-        facts = supplies.facts
-        firsts = [First(session.ask(question, lambda path: facts.get(path, ""))) for question in questions]
-    return Done(firsts, session.contents.reads - reads, time.thread_time() - begin)
-
-
-# A worker process costs some 0.3 s to start; reading a file some milliseconds.
-_WORTH_A_POOL = 128
-
-
-def _end_processes(executor: Executor) -> None:
-    # Python would wait for them at its end anyway, and sometimes fails then.
-    executor.shutdown(wait=True, cancel_futures=True)
-
-
-class Pool:
-    """Makes executors for the work, and another one where that broke.
-
-    alone
-        makes one for a single question that may end its process.
-    worth
-        so many files are read here before others are called in: they take a moment to start.
-    chunk
-        questions that travel together.
-    end
-        gives up an executor: what was not begun is dropped.
-    """
-
-    def __init__(
-        self,
-        make: Callable[[], Executor],
-        jobs: int,
-        *,
-        alone: Callable[[], Executor] | None = None,
-        worth: int = _WORTH_A_POOL,
-        chunk: int = CHUNK,
-        end: Callable[[Executor], None] = _end_processes,
-    ) -> None:
-        self.jobs, self.worth, self.chunk = jobs, worth, chunk
-        self.alone = alone or (lambda: _processes(1))
-        self._make, self._end = make, end
-        self._run = str(uuid4())
-        self._executor: Executor | None = None
-
-    def submit(self, questions: Sequence[Question], supplies: Supplies | None) -> Future[Done]:
-        """Give questions to a worker."""
-        if self._executor is None:
-            self._executor = self._make()
-        return self._executor.submit(work, questions, supplies, self._run)
-
-    def renew(self) -> None:
-        """Shut down an executor that lost its workers, or that is no longer needed."""
-        if self._executor is not None:
-            self._end(self._executor)
-            self._executor = None
-
-
-@contextmanager
-def pool_of(jobs: int, dask: str | None = None, *, worth: int = _WORTH_A_POOL) -> Iterator[Pool | None]:
-    """Yield a pool of processes on this machine, or of a Dask cluster at an address; None for one job."""
-    if dask is not None:
-        with _dask_client(dask) as client:
-            workers = sum(client.nthreads().values())
-            # Dask cancels tasks for which nobody waits, even those that have begun.
-            yield Pool(
-                client.get_executor,
-                max(1, workers),
-                worth=worth,
-                end=lambda executor: executor.shutdown(wait=False),
-            )
-        return
-    pool = Pool(lambda: _processes(jobs), jobs, worth=worth) if jobs > 1 else None
-    try:
-        yield pool
-    finally:
-        if pool is not None:
-            pool.renew()
-
-
-def _processes(jobs: int) -> Executor:
-    return workers(jobs, collect_seldom)
-
-
-def _dask_client(address: str) -> Any:
-    try:
-        from dask.distributed import Client
-    except ImportError as error:
-        raise InputError("--dask needs the extra: pip install 'silo-mod[dask]'") from error
-    try:
-        return Client(address, timeout=10, set_as_default=False)
-    except (OSError, ValueError) as error:
-        raise InputError(f"no Dask scheduler answers at {address}: {error}") from error
-
+from silo.bom.snapshot import from_plain
+from silo.fcstd.contents import Content
+from silo.vault.answers import StoredAnswer
+from silo.vault.index import Index
+from silo.vault.pool import CHUNK, Pool
+from silo.vault.questions import Done, FirstReading, KnownFiles, Question, WalkSession, work, work_in
 
 T = TypeVar("T")
 _RECALLED = 256  # answers that are held on the way from the index
@@ -360,7 +68,7 @@ class _Chunk:
     """Neighbouring questions, and who works on them."""
 
     questions: Sequence[Question]
-    supplies: Supplies | None
+    known_files: KnownFiles | None
     asked: Future[Done] | None = None
     tries: int = 0
 
@@ -411,7 +119,7 @@ class VaultReader:
         self.asked += len(left)
         pool = self._pool if self._pool is not None and len(left) >= self._pool.worth else None
         jobs, size = (1, CHUNK) if pool is None else (pool.jobs, pool.chunk)
-        contents, linked, held = dict[str, Content](), dict[int, First](), 0
+        contents, linked, held = dict[str, Content](), dict[int, FirstReading](), 0
         chunks = (_Chunk([asked[number] for number in group], None) for group in tapered(left, size, jobs))
         for number, first in zip(left, self._worked_on(chunks, pool), strict=True):
             if first.facts:
@@ -432,7 +140,7 @@ class VaultReader:
         for number, question in enumerate(asked):
             if number in linked:
                 stored_answer = next(walked).known
-                assert stored_answer is not None  # since supplies were given
+                assert stored_answer is not None  # since the files it needs were given
                 self._remember(question, stored_answer)
             elif number in waiting:
                 stored_answer = waiting.pop(number)
@@ -455,7 +163,7 @@ class VaultReader:
         self,
         asked: Sequence[Question],
         group: Sequence[int],
-        linked: Mapping[int, First],
+        linked: Mapping[int, FirstReading],
         contents: dict[str, Content],
     ) -> _Chunk:
         own = dict.fromkeys(linked[number].path for number in group)
@@ -464,27 +172,27 @@ class VaultReader:
         folders_and_links = [(linked[number].folders, linked[number].linked) for number in group]
         return _Chunk(
             [asked[number] for number in group],
-            Supplies(given, self.index.facts([*files]), folders_and_links),
+            KnownFiles(given, self.index.facts([*files]), folders_and_links),
         )
 
     def _remember(self, question: Question, answer: StoredAnswer) -> None:
         self.index.remember(question.path, question.name, answer)
 
-    def _worked_on(self, chunks: Iterable[_Chunk], pool: Pool | None) -> Iterator[First]:
+    def _worked_on(self, chunks: Iterable[_Chunk], pool: Pool | None) -> Iterator[FirstReading]:
         """Yield the results of the chunks, in their order."""
         waiting: deque[_Chunk] = deque()
         for chunk in chunks:
             if pool is None:
-                yield from work_in(self._session, chunk.questions, chunk.supplies).found
+                yield from work_in(self._session, chunk.questions, chunk.known_files).found
                 continue
-            chunk.asked = pool.submit(chunk.questions, chunk.supplies)
+            chunk.asked = pool.submit(chunk.questions, chunk.known_files)
             waiting.append(chunk)
             while len(waiting) > 3 * pool.jobs:
                 yield from self._collect(waiting, pool)
         while pool is not None and waiting:
             yield from self._collect(waiting, pool)
 
-    def _collect(self, waiting: deque[_Chunk], pool: Pool) -> list[First]:
+    def _collect(self, waiting: deque[_Chunk], pool: Pool) -> list[FirstReading]:
         """Wait for the first waiting chunk, and return its results."""
         chunk = waiting[0]
         while chunk.asked is not None:
@@ -496,9 +204,9 @@ class VaultReader:
             waiting.popleft()
             return self._counted(done)
         waiting.popleft()
-        return [self._alone(question, chunk.supplies, pool) for question in chunk.questions]
+        return [self._alone(question, chunk.known_files, pool) for question in chunk.questions]
 
-    def _counted(self, done: Done) -> list[First]:
+    def _counted(self, done: Done) -> list[FirstReading]:
         self._elsewhere += done.reads
         self.seconds += done.seconds
         return done.found
@@ -509,16 +217,16 @@ class VaultReader:
         pool.renew()
         for chunk in lost:
             chunk.tries += 1
-            chunk.asked = pool.submit(chunk.questions, chunk.supplies) if chunk.tries < _TRIES else None
+            chunk.asked = pool.submit(chunk.questions, chunk.known_files) if chunk.tries < _TRIES else None
 
-    def _alone(self, question: Question, supplies: Supplies | None, pool: Pool) -> First:
+    def _alone(self, question: Question, known_files: KnownFiles | None, pool: Pool) -> FirstReading:
         """Answer one question in a process of its own."""
         with pool.alone() as executor:
             try:
-                return self._counted(executor.submit(work, [question], supplies, str(uuid4())).result())[0]
+                return self._counted(executor.submit(work, [question], known_files, str(uuid4())).result())[0]
             except BrokenExecutor:
                 reason = "the process that read it died; the file may need more memory than there is"
-                return First(
+                return FirstReading(
                     StoredAnswer(json.dumps({"document": [question.path, reason]}), "[{},[]]", lasting=False)
                 )
 

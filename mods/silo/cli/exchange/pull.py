@@ -49,7 +49,8 @@ def run_pull(args: argparse.Namespace) -> int:
     """Fetch an item's files into a folder. Returns 1 if a file was left alone, or is not in Silo."""
     from silo.freecads.open_documents import open_in_any
     from silo.outbox.store import Store
-    from silo.vault.pull import Rules, fetched, place, pulled_json
+    from silo.vault.pull import Rules, place, pulled_json
+    from silo.vault.tree import fetched
 
     store, into = Store(), Path(args.into)
     opened = open_in_any()

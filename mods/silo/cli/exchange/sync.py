@@ -37,7 +37,7 @@ def run_sync(args: argparse.Namespace) -> int:
     """Sync each file; one failure does not stop the rest. Returns 1 or 3 if anything was left undone."""
     from silo.api.policy import NIGHT
     from silo.batch import ReportFile, RunSummary
-    from silo.vault.plan import only_job
+    from silo.vault.job import only_job
 
     refuse_assembly_of(args.tops, args.assembly)
     tops = documents_in(args.tops)
@@ -85,7 +85,8 @@ def _results(
     summary: RunSummary,
     stop: threading.Event,
 ) -> Iterator[TopResult]:
-    from silo.vault.plan import SyncJob, make_plan
+    from silo.vault.job import SyncJob
+    from silo.vault.plan import make_plan
 
     begin = time.monotonic()
     with reading_of(args) as reading:

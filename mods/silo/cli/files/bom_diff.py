@@ -20,7 +20,7 @@ from silo.platform import replacing, scratch_folder
 
 if TYPE_CHECKING:
     from silo.bom.compare.two_states import AssemblyChange, LineChange
-    from silo.vault.plan import FolderBoms
+    from silo.vault.folder_boms import FolderBoms
 
 
 _MARK = {
@@ -77,7 +77,7 @@ def run_bom_diff(args: argparse.Namespace) -> int:
 
 def _two_states(args: argparse.Namespace) -> tuple[FolderBoms, FolderBoms]:
     """Read the two states to compare. Raises InputError."""
-    from silo.vault.plan import read_folder
+    from silo.vault.folder_boms import read_folder
 
     if args.git is None:
         if len(args.folders) != 2:

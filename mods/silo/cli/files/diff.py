@@ -74,7 +74,7 @@ def _folder_diff(args: argparse.Namespace) -> int:
     from silo.cli.bom_display import diff_table
     from silo.cli.sync_display import outcome_text
     from silo.cli.terminal import console, plain
-    from silo.vault.plan import SyncJob
+    from silo.vault.job import SyncJob
 
     out, data = console(), []
     with plan_of(args) as (plan, reading, base), client_of(args) as client:

@@ -23,7 +23,7 @@ def add_where_used(parser: argparse.ArgumentParser) -> None:
 
 def run_where_used(args: argparse.Namespace) -> int:
     """Print the files; for an unchanged vault the index knows them."""
-    from silo.vault.reading import Question
+    from silo.vault.questions import Question
 
     if not os.path.isdir(args.root):
         raise InputError(f"{args.root} is not a folder. Name the folder of the vault.")

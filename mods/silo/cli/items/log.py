@@ -41,7 +41,7 @@ def run_log(args: argparse.Namespace) -> int:
     """Print the revisions, newest first; or what changed in the product."""
     from silo.checksums import sha256_of
     from silo.outbox.store import Store
-    from silo.vault.pull import RevisionBoms, file_revisions, words
+    from silo.vault.revisions import RevisionBoms, file_revisions, words
 
     path = os.path.realpath(args.file)
     if args.since:

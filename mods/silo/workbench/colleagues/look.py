@@ -94,7 +94,7 @@ def look_held(
     """
     from silo.api.address import canonical
     from silo.bom.snapshot import from_plain
-    from silo.vault.pull import top_of
+    from silo.vault.revisions import top_of
 
     extraction = outbox.bom(entry.id)[0]
     if not extraction or entry.server != canonical(client.base_url):
@@ -129,7 +129,7 @@ class _CommitFile:
     def lines(
         self, client: SiloClient, stands: Standing, mine: ComparedAssembly | None, cancelled: Cancel | None
     ) -> tuple[ThreeLines, ...]:
-        from silo.vault.pull import RevisionBoms
+        from silo.vault.revisions import RevisionBoms
 
         if mine is None:
             return ()

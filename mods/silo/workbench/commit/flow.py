@@ -228,7 +228,7 @@ class CommitFlow:
         announced = self._session.shown.newer
 
         def question(client: Any, control: Any) -> dict[str, Theirs]:
-            from silo.vault.pull import top_of
+            from silo.vault.revisions import top_of
 
             def mine(path: str) -> ComparedAssembly | None:
                 taken = self._session.in_gui(lambda: self._desk.snapshot(documents[path]), control)

@@ -277,7 +277,8 @@ class RevisionFlow:
         outbox = self._session.outbox
 
         def run(client: SiloClient, control: Control) -> Pulled:
-            from silo.vault.pull import Rules, fetched, place
+            from silo.vault.pull import Rules, place
+            from silo.vault.tree import fetched
 
             def progress(name: str, count: int) -> None:
                 control.progress(f"{count + 1}: {plain(name, 60)}", None)
@@ -343,7 +344,7 @@ class RevisionFlow:
         """Compare a revision's BOM with the one before, line by line in words; both files are read."""
 
         def run(client: SiloClient, control: Control) -> list[str]:
-            from silo.vault.pull import RevisionBoms, line_texts
+            from silo.vault.revisions import RevisionBoms, line_texts
 
             with RevisionBoms(client, part_number, path, control.cancelled) as boms:
                 return line_texts(boms.change(older, newer))
@@ -352,7 +353,7 @@ class RevisionFlow:
 
 
 def _history_of(client: SiloClient, part_number: str) -> ItemHistory:
-    from silo.vault.pull import file_revisions
+    from silo.vault.revisions import file_revisions
 
     item = client.get_item(part_number)
     revisions = file_revisions(client.revisions(part_number))

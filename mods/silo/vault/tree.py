@@ -1,0 +1,354 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Fetch an item's file with all that it links to into a scratch folder.
+
+The files themselves say what they link to. Which item a link means was written down by the commit; where it
+was not (an older client, another server), the item's BOM and its file names say it.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from silo.api.files import DocumentId, download_revision
+from silo.api.revisions import checksum_of
+from silo.api.transport import Cancel, stop_if
+from silo.api.wire import Item, LinkedFile, Release, Revision
+from silo.bom.errors import DocumentError, InputError, NotFoundError, RouteMissingError
+from silo.fcstd.linked import recorded_paths
+from silo.locator import refusal
+from silo.platform import scratch_folder
+from silo.vault.revisions import file_revisions
+
+if TYPE_CHECKING:
+    from silo.api.client import SiloClient
+
+
+MOST_FILES = 20_000
+
+_ABSOLUTE = re.compile(r"/|[A-Za-z]:|[A-Za-z][A-Za-z0-9+.-]+://")
+
+Progress = Callable[[str, int], object]
+
+
+@dataclass(frozen=True)
+class Holder:
+    """Whose revisions are those of a file: an item by its number, or a document. ``id`` is its UUID."""
+
+    of: str
+    id: str
+
+    @property
+    def part_number(self) -> str:
+        """Return the item's part number; "" for a document without one."""
+        return "" if isinstance(self.of, DocumentId) else self.of
+
+
+@dataclass(frozen=True)
+class Fetched:
+    """A file of the tree, in the scratch folder.
+
+    position
+        relative to the folder of the top file, with ``/``; may begin with ``../``.
+    part_number, item
+        of the file's item; a file of several items or none has no number, and ``item`` is its document.
+    earlier
+        the hashes of the item's revisions: such a file may be replaced, it is in Silo.
+    """
+
+    position: str
+    part_number: str
+    item: str
+    revision: Revision
+    content: Path
+    sha256: str
+    earlier: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class LostLink:
+    """A link whose file could not be fetched: who links, to which path, and why."""
+
+    position: str
+    path: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class FileTree:
+    """All files, the top first, and the links that lead nowhere."""
+
+    files: tuple[Fetched, ...]
+    lost: tuple[LostLink, ...] = ()
+
+
+@dataclass
+class _Fetch:
+    client: SiloClient
+    folder: Path
+    pinned: bool
+    cancelled: Cancel | None
+    progress: Progress
+    most: int
+    files: dict[str, Fetched] = field(default_factory=dict)
+    lost: list[LostLink] = field(default_factory=list)
+    release: Release | None = None
+    _at: datetime | None = None
+    _revisions: dict[str, list[Revision]] = field(default_factory=dict)
+    _contents: dict[tuple[str, int], tuple[Path, str]] = field(default_factory=dict)
+    _sought: set[str] = field(default_factory=set)
+
+    def tree(self, item: Item, number: int | None) -> FileTree:
+        holder = self.holder(item)
+        revisions = self.revisions(holder)
+        wanted = (
+            revisions if number is None else [other for other in revisions if other.revision_number == number]
+        )
+        if self.release is not None:
+            wanted = list(filter(None, [self.frozen(holder)]))
+        if not wanted:
+            which = "no file yet" if number is None else f"no file with the revision {number}"
+            if self.release is not None:
+                which = f"no file in revision {self.release.label}"
+            raise InputError(f"{item.part_number} has {which} in Silo")
+        top = wanted[0]
+        self._at = top.created_at
+        # The top lies where it lay in its project: a link that steps out of its folder and back leads to one
+        # place.
+        place = _place_in_project(top.file_path or top.file_name or f"{item.part_number}.FCStd")
+        left = [(place, holder, top)]
+        while left:
+            position, other_revision, revision = left.pop(0)
+            left += self.fetch(position, other_revision, revision)
+            if not left:
+                left = self.unlinked()
+        return FileTree(tuple(self.files.values()), tuple(self.lost))
+
+    def frozen(self, holder: Holder) -> Revision | None:
+        """Return the revision of a file in the release that is being fetched; None if the file is not
+        in it.
+        """
+        files = self.release.files if self.release is not None else ()
+        numbers = {file.document: file.revision for file in files}
+        revisions = self.revisions(holder) if holder.id in numbers else []
+        return next(
+            (revision for revision in revisions if revision.revision_number == numbers[holder.id]), None
+        )
+
+    def unlinked(self) -> list[tuple[str, Holder, Revision]]:
+        """Return the next file of the release to which no link led: it was uploaded by hand."""
+        there = {file.item for file in self.files.values()} | self._sought
+        for file in self.release.files if self.release is not None else ():
+            if file.document not in there:
+                self._sought.add(file.document)
+                holder = Holder(DocumentId(file.document), file.document)
+                revision = self.frozen(holder)
+                place = _place_in_project(file.file_path or file.file_name)
+                if revision is not None and place not in self.files:
+                    return [(place, holder, revision)]
+                self.lost.append(
+                    LostLink(place, place, "it is in the release, and not in Silo at this place")
+                )
+        return []
+
+    def holder(self, item: Item) -> Holder:
+        """Return the item; or, if it has no revisions, the file of several items that holds it."""
+        own = Holder(item.part_number, item.id)
+        if self.revisions(own):
+            return own
+        try:
+            several = self.client.documents_of(item.part_number)
+        except (NotFoundError, RouteMissingError):
+            return own
+        return Holder(DocumentId(several[0].id), several[0].id) if several else own
+
+    def fetch(
+        self, position: str, holder: Holder, revision: Revision
+    ) -> Iterator[tuple[str, Holder, Revision]]:
+        """Fetch one file, and yield the files to which it links and that were not seen before."""
+        stop_if(self.cancelled)
+        if (file := self.files.get(position)) is not None:
+            if file.item != holder.id:
+                path, other = (text or "another file" for text in (file.part_number, holder.part_number))
+                self.lost.append(LostLink(position, position, f"{path} and {other} want the same place"))
+            return
+        if len(self.files) >= self.most:
+            raise InputError(f"more than {self.most} files are not fetched in one go")
+        self.progress(posixpath.basename(position), len(self.files))
+        content, sha256 = self.content(holder.of, revision)
+        earlier = frozenset(filter(None, map(checksum_of, self.revisions(holder))))
+        self.files[position] = Fetched(
+            position, holder.part_number, holder.id, revision, content, sha256, earlier
+        )
+        try:
+            recorded = recorded_paths(content)
+        except DocumentError as error:
+            self.lost.append(LostLink(position, "", f"its links cannot be read: {error.reason}"))
+            return
+        if recorded:
+            yield from self.linked(position, holder, revision, recorded)
+
+    def content(self, of: str, revision: Revision) -> tuple[Path, str]:
+        number, checksum = revision.revision_number, checksum_of(revision)
+        key = (of, number)
+        if key not in self._contents:
+            target = self.folder / f"{len(self._contents)}.FCStd"
+            sha256 = download_revision(self.client, of, target, number, checksum, cancelled=self.cancelled)
+            self._contents[key] = (target, sha256)
+        return self._contents[key]
+
+    def revisions(self, holder: Holder) -> list[Revision]:
+        if holder.of not in self._revisions:
+            try:
+                self._revisions[holder.of] = file_revisions(self.client.revisions(holder.of))
+            except NotFoundError:
+                if holder.part_number:
+                    raise
+                self._revisions[holder.of] = []  # a document that never arrived, or a Silo without any
+        return self._revisions[holder.of]
+
+    def linked(
+        self, position: str, holder: Holder, revision: Revision, recorded: Sequence[str]
+    ) -> Iterator[tuple[str, Holder, Revision]]:
+        by_top = len(self.files) == 1
+        linked_revision = self.client.get_revision(holder.of, revision.revision_number)
+        links = {link.path.replace("\\", "/"): link for link in linked_revision.links}
+        ids = [link.item for link in links.values() if link.item]
+        items = self.client.get_items_by_uuid(ids, cancelled=self.cancelled) if ids else {}
+        others = _Children(self, holder.part_number)
+        for path in recorded:
+            link = links.get(path)
+            child = self.means(path, link, items, others)
+            target = posixpath.normpath(posixpath.join(posixpath.dirname(position), path))
+            why = _refused(path)
+            if not why and child is None:
+                why = "no item in Silo is known for it: it was never committed"
+                if link is not None and not link.sha256:
+                    why = "it was not there either when the file was committed"
+            chosen = self.choose(child, link.sha256 if link else "", by_top=by_top) if child else None
+            if not why and chosen is None:
+                why = f"{(child.part_number if child else '') or path} has no file in Silo"
+            if why or child is None or chosen is None:
+                self.lost.append(LostLink(position, path, why))
+            else:
+                yield target, child, chosen
+
+    def means(
+        self, path: str, link: LinkedFile | None, items: Mapping[str, Item], others: _Children
+    ) -> Holder | None:
+        """Find the item or document to which a link leads."""
+        if link is not None and link.document:
+            own = Holder(DocumentId(link.document), link.document)
+            if self.revisions(own):
+                return own
+        child = items.get(link.item) if link is not None and link.item else others.find(path)
+        return self.holder(child) if child is not None else None
+
+    def choose(self, child: Holder, sha256: str, *, by_top: bool) -> Revision | None:
+        """Choose the newest revision of a linked file; if a revision of the top was chosen, that of its time.
+
+        The top's own links were recorded with their hash (``sha256``). A file further below may have been
+        committed again after the file that links to it, but before the top.
+        """
+        if self.release is not None:
+            return self.frozen(child)
+        revisions = self.revisions(child)
+        if not self.pinned or not revisions:
+            return revisions[0] if revisions else None
+        at = self._at
+        same = [revision for revision in revisions if sha256 and checksum_of(revision) == sha256]
+        before = [
+            revision for revision in revisions if at and revision.created_at and revision.created_at <= at
+        ]
+        if same and by_top:
+            return same[0]
+        return max([*same[:1], *before[:1]] or revisions[-1:], key=lambda revision: revision.revision_number)
+
+
+@dataclass
+class _Children:
+    """Which item a recorded path means, where the commit did not say: by the BOM."""
+
+    fetch: _Fetch
+    part_number: str
+    _known: tuple[dict[str, str], dict[str, str]] | None = None
+
+    def find(self, path: str) -> Item | None:
+        by_path, by_name = self._known = self._known or self._read()
+        number = by_path.get(path) or by_name.get(posixpath.basename(path).casefold())
+        return self.fetch.client.get_item(number) if number else None
+
+    def _read(self) -> tuple[dict[str, str], dict[str, str]]:
+        by_path: dict[str, str] = {}
+        by_name: dict[str, str] = {}
+        if not self.part_number:
+            return {}, {}
+        try:
+            lines = self.fetch.client.get_bom(self.part_number)
+        except (NotFoundError, RouteMissingError):
+            return {}, {}
+        for line in lines:
+            number = line.child_part_number
+            by_path |= {
+                str(component.get("file", "")).replace("\\", "/"): number for component in line.components
+            }
+            for revision in self.fetch.revisions(Holder(number, ""))[:1]:
+                by_name[(revision.file_name or "").casefold()] = number
+        return by_path, by_name
+
+
+def _place_in_project(path: str) -> str:
+    """Return the path with a safe name; without its folder if that is not inside a project."""
+    folder, name = posixpath.split(path.replace("\\", "/"))
+    outside = any(":" in part or part in ("", ".", "..") or refusal(part) for part in folder.split("/"))
+    return _safe_name(name) if outside else posixpath.join(folder, _safe_name(name))
+
+
+def _refused(path: str) -> str:
+    """Say why a recorded path is not followed; "" if it is."""
+    if _ABSOLUTE.match(path):
+        return "it is an absolute path, which has no place in another folder"
+    if (refused := refusal(path)) is not None:
+        return refused.detail or "its path cannot be one"
+    if posixpath.splitext(path)[1].lower() != ".fcstd":
+        return "it is not a FreeCAD file"
+    return ""
+
+
+def _safe_name(name: str) -> str:
+    name = name.replace("/", "_").strip(". ") or "file"
+    if posixpath.splitext(name)[1].lower() != ".fcstd":
+        name += ".FCStd"
+    return f"_{name}" if refusal(name) is not None else name
+
+
+@contextmanager
+def fetched(
+    client: SiloClient,
+    part_number: str,
+    revision: int | str | None = None,
+    *,
+    cancelled: Cancel | None = None,
+    progress: Progress = lambda _name, _count: None,
+    most: int = MOST_FILES,
+) -> Iterator[FileTree]:
+    """Fetch the files of an item, and yield their tree in a scratch folder that ends with the block.
+
+    revision
+        the number of a file's revision: its linked files are then those of its time. The label of a released
+        revision: all files as they were frozen. None: the newest of all.
+
+    Raises InputError if the item has no such file, and for more than ``most`` files.
+    """
+    item = client.get_item(part_number)
+    number = revision if isinstance(revision, int) else None
+    release = client.get_release(item.part_number, revision) if isinstance(revision, str) else None
+    with scratch_folder("silo-pull-") as scratch:
+        fetch = _Fetch(client, Path(scratch), number is not None, cancelled, progress, most, release=release)
+        yield fetch.tree(item, number)
