@@ -62,7 +62,7 @@ from silo_server.db.tables import (
 from silo_server.db.transaction import EVENT_CHANNEL, MIGRATION_LOCK, Tx
 from silo_server.errors import cause_of
 from silo_server.events.log import HORIZON
-from silo_server.services import access, search
+from silo_server.services import audit, search
 from silo_server.services.revisions import FileStore
 from silo_server.settings import Settings
 from silo_server.times import stamp, utc_now
@@ -281,7 +281,7 @@ def _replace_rows(reader: Connection, tx: Tx, made: Manifest, report: Report) ->
     )
     _set_highest_ids(tx.conn, {**highest, "events": horizon + 1})
     search.rebuild_index(tx)
-    access.note(tx, "server.restored", detail=f"backup of {made.made_at}")
+    audit.note(tx, "server.restored", detail=f"backup of {made.made_at}")
     if tx.postgres:
         tx.conn.execute(select(func.pg_notify(EVENT_CHANNEL, "")))
 

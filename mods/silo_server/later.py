@@ -15,7 +15,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from silo.bom.errors import SiloError
 from silo_server.db.database import Database
 from silo_server.errors import cause_of
-from silo_server.services.access import note_token_uses
+from silo_server.services.access.tokens import note_token_uses
 from silo_server.services.bom.summary import keep_summaries
 from silo_server.services.looks import keep_looks
 

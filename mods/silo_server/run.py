@@ -52,7 +52,11 @@ from silo_server.http.request_log import Observed, log_to_stderr
 from silo_server.later import Later
 from silo_server.metrics import SHARED, Metrics
 from silo_server.probe import Probe
-from silo_server.services import access, search
+from silo_server.services import search
+from silo_server.services.access.configured_token import check_configured_secret, take_configured_token
+from silo_server.services.access.login_links import create_login_link
+from silo_server.services.access.tokens import START_TOKEN, create_token, shown_prefix
+from silo_server.services.access.users import User, create_user, get_user, make_admin, to_user
 from silo_server.services.revisions import FileStore
 from silo_server.settings import MIB, Settings, settings_from_environment
 from silo_server.times import Clock, stamp, utc_now
@@ -88,17 +92,17 @@ def prepare(db: Database, token: str | None = None, *, reset_admin: str | None =
         tx.lock(MIGRATION_LOCK)  # of two servers that start at once, one makes the first admin
         if tx.conn.scalar(select(func.count()).select_from(users)) == 0:
             settings = tx.settings
-            access.create_user(tx, settings.admin_username, Role.ADMIN, password=settings.admin_password)
+            create_user(tx, settings.admin_username, Role.ADMIN, password=settings.admin_password)
         if reset_admin is not None:
-            access.make_admin(tx, reset_admin)
-        admin = access.get_user(tx, reset_admin) if reset_admin else _first_admin(tx)
+            make_admin(tx, reset_admin)
+        admin = get_user(tx, reset_admin) if reset_admin else _first_admin(tx)
         secret, dead = token if admin else None, ""
         if admin and token is None:
             expires = stamp(tx.at + timedelta(days=START_TOKEN_DAYS))
-            secret = access.create_token(tx, admin.id, access.START_TOKEN, expires=expires)[1]
-        elif admin and token is not None and (dead := access.take_configured_token(tx, admin.id, token)):
+            secret = create_token(tx, admin.id, START_TOKEN, expires=expires)[1]
+        elif admin and token is not None and (dead := take_configured_token(tx, admin.id, token)):
             secret = None
-        link = access.create_login_link(tx, admin.username) if admin else None
+        link = create_login_link(tx, admin.username) if admin else None
         search.ensure_index(tx)
         last = tx.conn.scalar(select(events.c.at).order_by(events.c.id.desc()).limit(1)) or ""
         late = stamp(tx.at + timedelta(minutes=1))
@@ -110,11 +114,11 @@ def prepare(db: Database, token: str | None = None, *, reset_admin: str | None =
     return Welcome(admin.username if admin else None, secret, link, warnings)
 
 
-def _first_admin(tx: Tx) -> access.User | None:
+def _first_admin(tx: Tx) -> User | None:
     row = tx.conn.execute(
         select(users).where(users.c.role == Role.ADMIN.value, users.c.active).order_by(users.c.id).limit(1)
     ).one_or_none()
-    return access.to_user(row) if row is not None else None
+    return to_user(row) if row is not None else None
 
 
 READING_THREADS = 40
@@ -367,7 +371,7 @@ def serve(
         )
     given = token or os.environ.get("SILO_API_TOKEN") or None
     if given:
-        access.check_configured_secret(given)
+        check_configured_secret(given)
     sock = _bind(host, port)  # first: if the port is taken, no token is made that nobody sees
     try:
         welcome = _prepare(settings, given, reset_admin)
@@ -380,7 +384,7 @@ def serve(
     database, login_url = _without_password(settings), _login_url(settings, welcome)
     shown = welcome.token
     if shown and given:
-        shown = f"{access.shown_prefix(given)}… (the one you gave)"
+        shown = f"{shown_prefix(given)}… (the one you gave)"
     free = shutil.disk_usage(_nearest(own.storage)).free
     warnings = [*start_warnings(own, is_loopback(host), free), *welcome.warnings]
     settings = replace(settings, warnings=tuple(warnings))

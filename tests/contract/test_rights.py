@@ -20,8 +20,8 @@ from silo.bom.errors import ConflictError
 from silo_server.actors import SYSTEM, Role
 from silo_server.db.database import Database
 from silo_server.run import Greeting, RunningServer, prepare, running_server
-from silo_server.services import access
-from silo_server.services.access import shown_prefix
+from silo_server.services.access.tokens import shown_prefix
+from silo_server.services.access.users import change_user, create_user, get_user, list_users
 from silo_server.settings import Settings
 
 pytestmark = BOTH
@@ -117,10 +117,10 @@ def test_two_admins_who_demote_each_other_leave_one(kind: str, databases: Databa
     prepare(db)
     for number in range(4):
         with db.write() as tx:
-            access.change_user(tx, "admin", role=Role.ADMIN)
+            change_user(tx, "admin", role=Role.ADMIN)
             if number == 0:
-                access.create_user(tx, "other", Role.ADMIN)
-            access.change_user(tx, "other", role=Role.ADMIN)
+                create_user(tx, "other", Role.ADMIN)
+            change_user(tx, "other", role=Role.ADMIN)
         gate, refused = threading.Barrier(2), []
 
         def demote(name: str, gate: threading.Barrier = gate, refused: list[str] = refused) -> None:
@@ -129,7 +129,7 @@ def test_two_admins_who_demote_each_other_leave_one(kind: str, databases: Databa
                 if tx.postgres:
                     gate.wait(60)
                 try:
-                    access.change_user(tx, name, role=Role.VIEWER)
+                    change_user(tx, name, role=Role.VIEWER)
                 except ConflictError:
                     refused.append(name)
 
@@ -139,7 +139,7 @@ def test_two_admins_who_demote_each_other_leave_one(kind: str, databases: Databa
         for thread in threads:
             thread.join(60)
         with db.read() as tx:
-            admins = [user for user in access.list_users(tx) if user.role is Role.ADMIN]
+            admins = [user for user in list_users(tx) if user.role is Role.ADMIN]
         assert len(admins) == len(refused) == 1
     db.close()
 
@@ -166,7 +166,7 @@ def test_a_server_without_an_admin_starts_and_can_be_got_back(
         assert back.username is not None
         assert back.username.casefold() == name.casefold()
         with db.read() as tx:
-            user = access.get_user(tx, name)
+            user = get_user(tx, name)
         assert (user.role, user.active) == (Role.ADMIN, True)
         assert back.token
         assert back.login_secret

@@ -14,7 +14,7 @@ from sqlalchemy.exc import DataError, DisconnectionError, IntegrityError, Operat
 from silo_server.actors import Role
 from silo_server.db.database import Database
 from silo_server.run import RunningServer, create_app, prepare, running_server
-from silo_server.services.access import list_users
+from silo_server.services.access.users import list_users
 from silo_server.settings import Settings
 
 

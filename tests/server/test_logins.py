@@ -17,12 +17,21 @@ from sqlalchemy import func, select
 from silo.bom.errors import AuthError, BusyError, ConfigError
 from silo_server.actors import Actor, Role
 from silo_server.db.database import Database
-from silo_server.db.tables import api_tokens, login_attempts
+from silo_server.db.tables import api_tokens, login_attempts, users
 from silo_server.errors import TooManyAttemptsError
 from silo_server.housekeeping import tidy
 from silo_server.run import prepare
-from silo_server.services import access
-from silo_server.services.access import actor_by_token, check_configured_secret, log_in
+from silo_server.services.access.configured_token import check_configured_secret
+from silo_server.services.access.passwords import _HASHING, _decoy
+from silo_server.services.access.sessions import log_in
+from silo_server.services.access.tokens import (
+    actor_by_token,
+    create_token,
+    let_program_in,
+    list_tokens,
+    revoke_token,
+)
+from silo_server.services.access.users import change_user, create_user, row_of
 from silo_server.services.items import NewItem, create_item
 from silo_server.services.revisions import FileStore
 from silo_server.settings import Settings
@@ -39,12 +48,12 @@ class Door:
         self.db = Database(Settings(database_url=url, files_dir=folder), lambda: self.now)
         prepare(self.db)
         with self.db.write() as tx:
-            hashed = access.create_user(tx, "u0", Role.VIEWER, password=RIGHT)
+            hashed = create_user(tx, "u0", Role.VIEWER, password=RIGHT)
             assert hashed.has_password
             for number in range(1, 40):
-                access.create_user(tx, f"u{number}", Role.VIEWER)
-            stored = access.row_of(tx, "u0").password_hash
-            tx.conn.execute(access.users.update().values(password_hash=stored))
+                create_user(tx, f"u{number}", Role.VIEWER)
+            stored = row_of(tx, "u0").password_hash
+            tx.conn.execute(users.update().values(password_hash=stored))
 
     def knock(self, name: str, address: str, password: str = WRONG) -> str:
         """in, wrong, or the seconds to wait."""
@@ -147,15 +156,15 @@ def test_guesses_at_the_same_time_are_counted_before_they_are_looked_at(door: Do
 
 def test_who_was_sent_away_has_not_failed(door: Door) -> None:
     """A server that is too busy to look at a password counts nothing."""
-    access._decoy()
-    with access._HASHING.enter(), access._HASHING.enter():
-        access._HASHING._seconds, patience = 0.01, access._HASHING._seconds
+    _decoy()
+    with _HASHING.enter(), _HASHING.enter():
+        _HASHING._seconds, patience = 0.01, _HASHING._seconds
         try:
             for _ in range(10):
                 with pytest.raises(BusyError):
                     log_in(door.db, "u1", RIGHT, HOME)
         finally:
-            access._HASHING._seconds = patience
+            _HASHING._seconds = patience
     assert door.knock("u1", HOME, RIGHT) == "in"
 
 
@@ -186,7 +195,7 @@ def test_a_new_secret_of_the_environment_replaces_its_predecessor(door: Door) ->
         return actor_by_token(door.db, secret, HOME) is not None
 
     with door.db.write() as tx:
-        _, mine = access.create_token(tx, 1, "mine")
+        _, mine = create_token(tx, 1, "mine")
     for _ in range(2):  # each start gives the same
         assert prepare(door.db, FIRST).token == FIRST
         assert works(FIRST)
@@ -201,9 +210,9 @@ def test_a_new_secret_of_the_environment_replaces_its_predecessor(door: Door) ->
         tx.conn.execute(api_tokens.update().values(expires_at=tx.stamp, revoked_at=None))
     assert "it ended on" in prepare(door.db, SECOND).warnings[0]
     with door.db.write() as tx:
-        access.create_user(tx, "chief", Role.ADMIN)
+        create_user(tx, "chief", Role.ADMIN)
         tx.conn.execute(api_tokens.update().values(expires_at=None))
-        access.change_user(tx, "admin", active=False)
+        change_user(tx, "admin", active=False)
         tx.conn.execute(api_tokens.update().values(revoked_at=None))
     assert "its user is not active" in prepare(door.db, SECOND).warnings[0]
     with door.db.write() as tx:
@@ -216,20 +225,20 @@ def test_a_program_that_is_let_in_twice_has_one_token(door: Door) -> None:
     """The page was sent twice: the program's secret is the same."""
     for _ in range(2):
         with door.db.write(Actor("admin", Role.ADMIN, 1)) as tx:
-            access.let_program_in(tx, "FreeCAD on here", "ab" * 32)
-            assert [token.name for token in access.list_tokens(tx)].count("FreeCAD on here") == 1
+            let_program_in(tx, "FreeCAD on here", "ab" * 32)
+            assert [token.name for token in list_tokens(tx)].count("FreeCAD on here") == 1
 
 
 def test_a_lock_out_keeps_when_a_token_was_revoked_before(door: Door) -> None:
     """The list of tokens says since when each of them lets nobody in."""
     with door.db.write() as tx:
-        access.create_user(tx, "chief", Role.ADMIN)
-        before, _ = [access.create_token(tx, 1, name)[0] for name in ("before", "now")]
-        access.revoke_token(tx, before.id, None)
+        create_user(tx, "chief", Role.ADMIN)
+        before, _ = [create_token(tx, 1, name)[0] for name in ("before", "now")]
+        revoke_token(tx, before.id, None)
     door.later(60)
     with door.db.write() as tx:
-        access.change_user(tx, "admin", active=False)
-        ended = {token.name: token.revoked_at or "" for token in access.list_tokens(tx)}
+        change_user(tx, "admin", active=False)
+        ended = {token.name: token.revoked_at or "" for token in list_tokens(tx)}
     assert "" < ended["before"] < ended["now"]
 
 

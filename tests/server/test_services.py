@@ -24,18 +24,17 @@ from silo_server.db.database import Database
 from silo_server.db.rows import insert_rows, one_of, update_rows
 from silo_server.db.tables import answers, items, users
 from silo_server.fields import from_row, to_wire
-from silo_server.services.access import (
+from silo_server.services.access.login_links import create_login_link, use_login_link
+from silo_server.services.access.sessions import actor_by_session
+from silo_server.services.access.tokens import (
     Token,
-    actor_by_session,
     actor_by_token,
-    create_login_link,
     create_own_token,
     create_token,
-    create_user,
     revoke_token,
     secret_of_form,
-    use_login_link,
 )
+from silo_server.services.access.users import create_user
 from silo_server.services.bom.line_edit import check_state, edited_state
 from silo_server.services.bom.lines import state_to_json, stored_state
 from silo_server.services.bom.merge_request import read_merge_request

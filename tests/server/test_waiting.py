@@ -27,7 +27,7 @@ from silo_server.db.transaction import Tx
 from silo_server.later import Later
 from silo_server.probe import Probe
 from silo_server.run import running_server
-from silo_server.services import access
+from silo_server.services.access.tokens import actor_by_token, list_tokens, note_token_uses
 from silo_server.services.revisions import FileStore
 from silo_server.settings import Settings
 
@@ -115,15 +115,15 @@ def test_many_may_ask_for_the_health_at_once(db: Database, tmp_path: Path) -> No
 def test_the_last_use_of_a_token_is_noted_when_it_can_be(db: Database) -> None:
     """Reading with a token needs no write; what could not be noted is noted later."""
     with db.read() as tx:
-        token = access.list_tokens(tx)[0]
-    assert access.actor_by_token(db, "silo_test", "") is not None
+        token = list_tokens(tx)[0]
+    assert actor_by_token(db, "silo_test", "") is not None
     assert list(db.token_uses) == [token.id]
     with db.read() as tx:
-        assert access.list_tokens(tx)[0].last_used_at is None
-    access.note_token_uses(db)
+        assert list_tokens(tx)[0].last_used_at is None
+    note_token_uses(db)
     assert db.token_uses == {}
     with db.read() as tx:
-        assert access.list_tokens(tx)[0].last_used_at is not None
+        assert list_tokens(tx)[0].last_used_at is not None
 
 
 class Meanwhile(Database):
@@ -145,9 +145,9 @@ def test_a_use_that_comes_while_others_are_written_down_is_noted_next(db: Databa
     busy.token_uses[1] = "2026-01-01"
     busy.then = lambda: busy.token_uses.update({1: "2026-01-02"})
     for left, noted in (({1: "2026-01-02"}, "2026-01-01"), ({}, "2026-01-02")):
-        access.note_token_uses(busy)
+        note_token_uses(busy)
         with busy.read() as tx:
-            assert (access.list_tokens(tx)[0].last_used_at, busy.token_uses) == (noted, left)
+            assert (list_tokens(tx)[0].last_used_at, busy.token_uses) == (noted, left)
     busy.close()
 
 

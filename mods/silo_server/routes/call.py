@@ -21,10 +21,8 @@ from silo_server.http.request_log import info_of
 from silo_server.probe import Probe
 from silo_server.routes.masked_secret import unmasked
 from silo_server.routes.requests import FORM_TYPES, form_of
-from silo_server.services.access import (
-    actor_by_session,
-    actor_by_token,
-)
+from silo_server.services.access.sessions import actor_by_session
+from silo_server.services.access.tokens import actor_by_token
 from silo_server.services.revisions import FileStore
 from silo_server.settings import Settings
 

@@ -13,7 +13,8 @@ from silo.api.wire import RELEASE_LABEL, MergeRequest
 from silo.bom.quantities import LARGEST_QUANTITY
 from silo.bom.text import REFUSED_CHARACTERS
 from silo_server.schema import ITEM_TYPES, find_schema
-from silo_server.services.access import MAX_PASSWORD, MIN_PASSWORD, USERNAME_FORM
+from silo_server.services.access.passwords import MAX_PASSWORD, MIN_PASSWORD
+from silo_server.services.access.users import USERNAME_FORM
 from silo_server.services.items import NUMBER_FORM, RESERVED
 from silo_server.user_json import MAX_KEY, MAX_NUMBER
 

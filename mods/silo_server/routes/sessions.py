@@ -13,7 +13,8 @@ from silo_server.routes.answers import READ_ERRORS, WRITE_ERRORS, json_answer
 from silo_server.routes.call import SESSION_COOKIE, ServerDep, Viewer, client_address, server_of
 from silo_server.routes.models import RequestBody, Short, Text
 from silo_server.routes.users import NewPassword
-from silo_server.services import access
+from silo_server.services.access import sessions
+from silo_server.services.access.sessions import NewSession, set_own_password
 
 router = APIRouter(prefix="/api", tags=["auth"])
 
@@ -42,7 +43,7 @@ class PasswordBody(RequestBody):
 @router.post("/auth/login", responses=LOGIN_ERRORS)
 def log_in(server: ServerDep, request: Request, body: LoginBody) -> Response:
     """Begin a browser session: set the cookie, and answer with the CSRF secret for later requests."""
-    session = access.log_in(server.db, body.username, body.password, client_address(request))
+    session = sessions.log_in(server.db, body.username, body.password, client_address(request))
     response = json_answer({"username": session.username, "csrf_token": session.csrf_token})
     set_session_cookie(response, request, session)
     return response
@@ -51,7 +52,7 @@ def log_in(server: ServerDep, request: Request, body: LoginBody) -> Response:
 @router.post("/auth/logout", status_code=204, responses=READ_ERRORS)
 def log_out(call: Viewer) -> Response:
     """End this browser session."""
-    access.log_out(call.server.db, call.actor)
+    sessions.log_out(call.server.db, call.actor)
     response = Response(status_code=204)
     response.delete_cookie(SESSION_COOKIE)
     return response
@@ -71,11 +72,11 @@ def who_am_i(call: Viewer) -> dict[str, Any]:
 @router.put("/auth/password", status_code=204, responses={**LOGIN_ERRORS, **WRITE_ERRORS})
 def set_password(call: Viewer, body: PasswordBody) -> Response:
     """Set the caller's password and end all their sessions. Not with a token; needs the old password."""
-    access.set_own_password(call.server.db, call.actor, body.password, body.current_password)
+    set_own_password(call.server.db, call.actor, body.password, body.current_password)
     return Response(status_code=204)
 
 
-def set_session_cookie(response: Response, request: Request, session: access.NewSession) -> None:
+def set_session_cookie(response: Response, request: Request, session: NewSession) -> None:
     """Set the session's cookie: not for scripts or other sites, and only over TLS if there is TLS."""
     settings = server_of(request).settings
     response.set_cookie(

@@ -15,7 +15,8 @@ from silo_server.routes import openapi
 from silo_server.routes.answers import READ_ERRORS, WRITE_ERRORS
 from silo_server.routes.call import Call, Viewer
 from silo_server.routes.models import RequestBody, Short
-from silo_server.services import access
+from silo_server.services.access import tokens
+from silo_server.services.access.tokens import Token, check_may_change, create_own_token
 
 router = APIRouter(prefix="/api", tags=["auth"])
 
@@ -42,7 +43,7 @@ class TokenBody(RequestBody):
 def list_tokens(call: Viewer) -> list[dict[str, Any]]:
     """Return the caller's tokens; never their secrets."""
     with call.read() as tx:
-        return [_token(token) for token in access.list_tokens(tx, call.actor.own_id)]
+        return [_token(token) for token in tokens.list_tokens(tx, call.actor.own_id)]
 
 
 @router.post("/auth/tokens", status_code=201, responses=WRITE_ERRORS)
@@ -51,7 +52,7 @@ def create_token(call: Viewer, body: TokenBody) -> dict[str, Any]:
     forever = "expires_in_days" in body.model_fields_set and body.expires_in_days is None
     scope = max(body.scopes, key=list(Scope).index) if body.scopes else None
     with call.write(even_when_read_only=True) as tx:
-        token, secret = access.create_own_token(
+        token, secret = create_own_token(
             tx, body.name, days=body.expires_in_days, forever=forever, scope=scope
         )
         return {**_token(token), "token": secret}
@@ -66,13 +67,13 @@ def revoke_token(call: Viewer, token_id: Annotated[int, Path(ge=1, le=2**62)]) -
 
 def revoke(call: Call, token_id: int) -> None:
     """Revoke a token of the caller's own, or anybody's for an admin."""
-    access.check_may_change(call.actor)
+    check_may_change(call.actor)
     owner = None if call.actor.role is Role.ADMIN else call.actor.own_id
     with call.write(even_when_read_only=True) as tx:
-        access.revoke_token(tx, token_id, owner)
+        tokens.revoke_token(tx, token_id, owner)
 
 
-def _token(token: access.Token) -> dict[str, Any]:
+def _token(token: Token) -> dict[str, Any]:
     return {
         **to_wire(token, "username", "scope"),
         "scopes": [scope.value for scope in Scope if token.scope.covers(scope)],

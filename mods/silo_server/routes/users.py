@@ -15,7 +15,9 @@ from silo_server.routes.answers import READ_ERRORS, WRITE_ERRORS
 from silo_server.routes.call import Admin, Call
 from silo_server.routes.models import RequestBody, Short, Text
 from silo_server.routes.requests import PageFrom
-from silo_server.services import access
+from silo_server.services import audit
+from silo_server.services.access import login_links, users
+from silo_server.services.access.users import User
 
 router = APIRouter(prefix="/api", tags=["auth"])
 
@@ -45,14 +47,14 @@ class UserChangeBody(RequestBody):
 def list_users(call: Admin) -> list[dict[str, Any]]:
     """Return all users."""
     with call.read() as tx:
-        return [_user(user) for user in access.list_users(tx)]
+        return [_user(user) for user in users.list_users(tx)]
 
 
 @router.post("/users", status_code=201, responses=WRITE_ERRORS)
 def create_user(call: Admin, body: NewUserBody) -> dict[str, Any]:
     """Make a user."""
     with call.write(even_when_read_only=True) as tx:
-        user = access.create_user(
+        user = users.create_user(
             tx, body.username, body.role, display_name=body.display_name, password=body.password
         )
         return _user(user)
@@ -62,7 +64,7 @@ def create_user(call: Admin, body: NewUserBody) -> dict[str, Any]:
 def change_user(call: Admin, username: str, body: UserChangeBody) -> dict[str, Any]:
     """Change a user's role, name, password or right to approve, or block all access of the user."""
     with call.write(even_when_read_only=True) as tx:
-        user = access.change_user(tx, username, **body.model_dump())
+        user = users.change_user(tx, username, **body.model_dump())
         return _user(user)
 
 
@@ -76,8 +78,8 @@ def create_login_link(call: Admin, username: str) -> dict[str, Any]:
 def login_path(call: Call, username: str) -> str:
     """Make a login link for a user; return its path."""
     with call.write(even_when_read_only=True) as tx:
-        secret = access.create_login_link(tx, username)
-        access.note(tx, "login_link.created", username)
+        secret = login_links.create_login_link(tx, username)
+        audit.note(tx, "login_link.created", username)
         return f"/login/link/{secret}"
 
 
@@ -87,9 +89,9 @@ def list_audit(
 ) -> list[dict[str, Any]]:
     """Return the audit list, newest first: who did what."""
     with call.read() as tx:
-        entries = access.list_entries(tx, limit, before)
+        entries = audit.list_entries(tx, limit, before)
     return [to_wire(entry) for entry in entries]
 
 
-def _user(user: access.User) -> dict[str, Any]:
+def _user(user: User) -> dict[str, Any]:
     return to_wire(user, "id")

@@ -23,7 +23,7 @@ from silo_server.db.rows import one_of
 from silo_server.db.tables import document_items, documents, items, orders, revisions
 from silo_server.db.transaction import Tx
 from silo_server.fields import from_row
-from silo_server.services import access
+from silo_server.services import audit
 from silo_server.services.bom.frozen import frozen_product
 from silo_server.services.bom.summary import Summary, own_worth, summary_of
 from silo_server.services.bom.transfer import Export, Row, View
@@ -374,7 +374,7 @@ def record(
         }
         del row["part_number"]
         made.append(tx.conn.execute(insert(orders).values(row).returning(orders.c.id)).scalar_one())
-    access.note(tx, "order.recorded", product.part_number, f"{counted(len(made), 'part')}: {note}"[:500])
+    audit.note(tx, "order.recorded", product.part_number, f"{counted(len(made), 'part')}: {note}"[:500])
     return list_recorded(tx, made)
 
 
@@ -387,7 +387,7 @@ def take_back(tx: Tx, part_number: str, order_id: int) -> Recorded:
         raise ConflictError(f"order {order_id} was taken back at {recorded[0][0].ended_at[:16]} already")
     ended = {"ended_at": tx.stamp, "ended_by": tx.actor.username}
     tx.conn.execute(update(orders).where(orders.c.id == order_id).values(ended))
-    access.note(tx, "order.taken_back", recorded[0][1], f"order {order_id}")
+    audit.note(tx, "order.taken_back", recorded[0][1], f"order {order_id}")
     return list_recorded(tx, [order_id])[0][0]
 
 

@@ -37,7 +37,7 @@ from silo_server.db.transaction import Tx
 from silo_server.errors import TooLargeError
 from silo_server.events import announce
 from silo_server.fields import from_row
-from silo_server.services import access
+from silo_server.services import audit
 from silo_server.services.items import get_item
 from silo_server.user_json import dumps
 from silo_server.values import Item
@@ -379,7 +379,7 @@ def _change(tx: Tx, release: Release, **values: Any) -> None:
 
 
 def _announce(tx: Tx, item: Item, release: Release, what: str) -> None:
-    access.note(tx, f"release.{what}", item.part_number, f"revision {release.label}")
+    audit.note(tx, f"release.{what}", item.part_number, f"revision {release.label}")
     announce.released(tx, item, release.label, what)
 
 

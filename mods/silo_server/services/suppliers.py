@@ -33,7 +33,7 @@ from silo_server.db.tables import items, supplier_changes
 from silo_server.db.transaction import Tx
 from silo_server.events import announce
 from silo_server.fields import from_row
-from silo_server.services import access
+from silo_server.services import audit
 from silo_server.services.bom.imports import Layout, Record, Table
 from silo_server.services.bom.tree import DEFAULT_CURRENCY, RolledItem, currency_of, positive_number
 from silo_server.services.items import get_by_numbers, get_item
@@ -572,7 +572,7 @@ def set_rates(tx: Tx, own: str, texts: Iterable[tuple[str, str]]) -> dict[str, D
     if problems:
         raise RejectedError("; ".join(problems), problems)
     rate_texts = {currency: decimal_text(rate) for currency, rate in rates.items()}
-    access.note(
+    audit.note(
         tx,
         "rates.set",
         next(iter(rate_texts)),

@@ -38,7 +38,13 @@ from silo_server.routes.requests import FORM_TYPES, PageFrom, form_of
 from silo_server.routes.sessions import set_session_cookie
 from silo_server.routes.tokens import revoke
 from silo_server.routes.users import login_path
-from silo_server.services import access
+from silo_server.services import audit
+from silo_server.services.access import sessions, tokens, users
+from silo_server.services.access.login_links import use_login_link
+from silo_server.services.access.passwords import MIN_PASSWORD
+from silo_server.services.access.sessions import NewSession, actor_by_session, set_own_password
+from silo_server.services.access.tokens import create_own_token, list_tokens, secret_of_form
+from silo_server.services.access.users import get_user, list_users
 from silo_server.services.mode import change_mode
 from silo_server.standing import standing
 from silo_server.web.forms import (
@@ -181,14 +187,14 @@ def log_in(request: Request, server: ServerDep, form: Form) -> Response:
             return _login_page(request, target, _("You are not logged in yet in this browser."), 401, kept)
         return page_for(request, actor, "again.html", kept=kept) if kept else back(target)
     try:
-        session = access.log_in(
+        session = sessions.log_in(
             server.db, text(form, "username", 200), password_of(form, "password"), client_address(request)
         )
     except (AuthError, TooManyAttemptsError) as error:
         return _login_page(request, target, str(error), error.status_hint, kept)
     if kept is None:
         return _with_session(request, session, target)
-    actor = access.actor_by_session(server.db, session.secret, client_address(request))
+    actor = actor_by_session(server.db, session.secret, client_address(request))
     shown = page_for(request, actor, "again.html", kept=kept)
     set_session_cookie(shown, request, session)
     return shown
@@ -205,7 +211,7 @@ def use_link(request: Request, server: ServerDep, secret: str, form: Form) -> Re
     """Begin a session by a one-time link; a used one still leads on in a browser that is logged in."""
     target = local_path(text(form, "next"))
     try:
-        session = access.use_login_link(server.db, secret, client_address(request))
+        session = use_login_link(server.db, secret, client_address(request))
     except AuthError as error:
         if find_actor(request) is not None:
             return back(target)
@@ -227,14 +233,14 @@ def ask_for_program(call: Reader, name: ProgramName, proof: Proof) -> Response:
 def let_program_in(call: Reader, name: ProgramName, proof: Proof) -> Response:
     """Make a token for a program, which alone knows its secret: only the SHA-256 came here."""
     with call.write(even_when_read_only=True) as tx:
-        access.let_program_in(tx, name, proof)
+        tokens.let_program_in(tx, name, proof)
     return back("/account", _("%(name)s is logged in. You may close this page.", name=name))
 
 
 @router.post("/logout")
 def log_out(call: Reader) -> Response:
     """End the session."""
-    access.log_out(call.server.db, call.actor)
+    sessions.log_out(call.server.db, call.actor)
     response = RedirectResponse("/login", 303)
     response.delete_cookie(SESSION_COOKIE)
     return response
@@ -251,7 +257,7 @@ def choose_language(form: Form) -> Response:
     return response
 
 
-def _with_session(request: Request, session: access.NewSession, target: str) -> Response:
+def _with_session(request: Request, session: NewSession, target: str) -> Response:
     response = back(target)
     set_session_cookie(response, request, session)
     return response
@@ -276,7 +282,7 @@ def create_user(call: Administrator, form: Form) -> Response:
     username = typed["username"]
     try:
         with call.write(even_when_read_only=True) as tx:
-            access.create_user(
+            users.create_user(
                 tx,
                 username,
                 _role(typed["role"]),
@@ -295,7 +301,7 @@ def change_user(call: Administrator, username: str, form: Form) -> Response:
     seen = {name: text(form, f"was_{name}") for name in typed if f"was_{name}" in form}
     try:
         with call.write(even_when_read_only=True) as tx:
-            user = access.get_user(tx, username)
+            user = get_user(tx, username)
             now = {
                 "role": user.role.value,
                 "active": "yes" if user.active else "no",
@@ -311,7 +317,7 @@ def change_user(call: Administrator, username: str, form: Form) -> Response:
                     )
                 )
             role, active, approver = map(edit.mine.get, ("role", "active", "approver"))
-            access.change_user(
+            users.change_user(
                 tx,
                 username,
                 role=_role(role) if role is not None else None,
@@ -365,7 +371,7 @@ def system_page(call: Administrator) -> Response:
 def audit_page(call: Administrator, before: PageFrom = None, after: PageFrom = None) -> Response:
     """Show the audit list, newest first."""
     with call.read() as tx:
-        part = part_of(partial(access.list_entries, tx), AUDIT_SIZE, before, after)
+        part = part_of(partial(audit.list_entries, tx), AUDIT_SIZE, before, after)
     return page(call, "audit.html", entries=part.rows, part=part)
 
 
@@ -378,16 +384,16 @@ def _show(
     typed: Mapping[str, str] | None = None,
 ) -> Response:
     with call.read() as tx:
-        users = access.list_users(tx)
-        tokens = [token for token in access.list_tokens(tx) if token.revoked_at is None]
+        everyone = list_users(tx)
+        valid_tokens = [token for token in list_tokens(tx) if token.revoked_at is None]
         now, mode = tx.stamp, mode_of(tx)
         run = last_run(tx)
     return page(
         call,
         "users.html",
         status=status,
-        users=users,
-        tokens=tokens,
+        users=everyone,
+        tokens=valid_tokens,
         now=now,
         mode=mode,
         run=run,
@@ -397,7 +403,7 @@ def _show(
         link=link,
         typed=typed or {},
         minutes=int(call.server.settings.login_link_seconds // 60),
-        shortest=access.MIN_PASSWORD,
+        shortest=MIN_PASSWORD,
     )
 
 
@@ -432,10 +438,10 @@ def create_token(call: Reader, form: Form) -> Response:
         return _own_page(call, problem=_("Choose a lifetime and a scope."))
     days, scope, secret = LIFETIMES[ends], Scope(wanted), None
     if key := text(form, "key"):
-        secret = access.secret_of_form(call.actor, key, name, ends, wanted)
+        secret = secret_of_form(call.actor, key, name, ends, wanted)
     try:
         with call.write(even_when_read_only=True) as tx:
-            _token, secret = access.create_own_token(
+            _token, secret = create_own_token(
                 tx, name, days=days, forever=days is None, scope=scope, secret=secret
             )
     except ConflictError as error:
@@ -457,7 +463,7 @@ def set_password(call: Reader, form: Form) -> Response:
     try:
         if password != again:
             raise RejectedError(_("The two passwords differ."))
-        access.set_own_password(call.server.db, call.actor, password, password_of(form, "current"))
+        set_own_password(call.server.db, call.actor, password, password_of(form, "current"))
     except (RejectedError, TooManyAttemptsError) as error:
         return _own_page(call, problem=str(error))
     response = back("/login", _("The password is set. Log in with it."))
@@ -467,14 +473,14 @@ def set_password(call: Reader, form: Form) -> Response:
 
 def _own_page(call: Call, *, problem: str = "", fresh: tuple[str, str] | None = None) -> Response:
     with call.read() as tx:
-        tokens = access.list_tokens(tx, call.actor.own_id)
+        own_tokens = list_tokens(tx, call.actor.own_id)
         now = tx.stamp
-        user = access.get_user(tx, call.actor.username)
+        user = get_user(tx, call.actor.username)
     return page(
         call,
         "account.html",
         status=400 if problem else 200,
-        tokens=tokens,
+        tokens=own_tokens,
         now=now,
         user=user,
         lifetimes=[days for days in LIFETIMES.values() if days],
@@ -483,5 +489,5 @@ def _own_page(call: Call, *, problem: str = "", fresh: tuple[str, str] | None = 
         asks_password=not call.actor.by_link,
         problem=problem,
         fresh=fresh,
-        shortest=access.MIN_PASSWORD,
+        shortest=MIN_PASSWORD,
     )

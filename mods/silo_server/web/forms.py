@@ -24,7 +24,7 @@ from silo.bom.quantities import plain
 from silo.bom.text import character_problem
 from silo_server.routes.call import server_of
 from silo_server.routes.requests import form_of
-from silo_server.services.access import MAX_PASSWORD
+from silo_server.services.access.passwords import MAX_PASSWORD
 from silo_server.web.render import NOTICE, NOTICE_COOKIE, _
 
 NOTICE_SECONDS = 60

@@ -18,7 +18,7 @@ from silo_server.errors import TooLargeError
 from silo_server.routes.call import Call
 from silo_server.routes.releases import frozen_now
 from silo_server.services import releases
-from silo_server.services.access import get_user
+from silo_server.services.access.users import get_user
 from silo_server.services.bom import tree
 from silo_server.services.bom.frozen import ProductContent, frozen_product
 from silo_server.services.bom.summary import summary_of

@@ -9,7 +9,8 @@ from silo.bom.errors import ForbiddenError
 from silo_server.actors import Role
 from silo_server.db.tables import assignees, users
 from silo_server.db.transaction import Tx
-from silo_server.services import access
+from silo_server.services import audit
+from silo_server.services.access.users import get_user, list_users
 from silo_server.services.items import get_item
 from silo_server.values import Item
 
@@ -19,11 +20,11 @@ def assign(tx: Tx, part_number: str, username: str) -> None:
     item = get_item(tx, part_number, lock=True)
     tx.conn.execute(delete(assignees).where(assignees.c.item_id == item.id))
     if username:
-        user = access.get_user(tx, username)
+        user = get_user(tx, username)
         if not (user.active and user.role.covers(Role.EDITOR)):
             raise ForbiddenError(f"{user.username} cannot change BOMs, so cannot settle what is open in one")
         tx.conn.execute(insert(assignees).values(item_id=item.id, user_id=user.id, at=tx.stamp))
-    access.note(tx, "bom.assigned", item.part_number, username or "nobody")
+    audit.note(tx, "bom.assigned", item.part_number, username or "nobody")
 
 
 def assignee_of(tx: Tx, item: Item) -> str:
@@ -34,4 +35,4 @@ def assignee_of(tx: Tx, item: Item) -> str:
 
 def editors(tx: Tx) -> list[str]:
     """List the names of all users who may settle what is open."""
-    return [user.username for user in access.list_users(tx) if user.active and user.role.covers(Role.EDITOR)]
+    return [user.username for user in list_users(tx) if user.active and user.role.covers(Role.EDITOR)]

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The token that the server's environment names (``SILO_API_TOKEN``).
+
+A new value takes the place of the one before; a secret that others may know is refused.
+"""
+
+from __future__ import annotations
+
+import re
+
+from sqlalchemy import select, update
+
+from silo.bom.errors import ConfigError
+from silo_server.db.tables import api_tokens, users
+from silo_server.db.transaction import Tx
+from silo_server.services.access.tokens import CONFIGURED, create_token, secret_hash
+from silo_server.services.audit import note
+from silo_server.times import wire_time
+
+SHORTEST_SECRET = 20
+
+_PLACEHOLDER = re.compile(
+    "change.?me|change.?this|example|placeholder|your.?(own|token|secret)", re.IGNORECASE
+)
+
+
+def take_configured_token(tx: Tx, user_id: int, secret: str) -> str:
+    """Make the secret of the server's environment a token of the user, and revoke its predecessors.
+
+    Returns why it lets nobody in, or "" if it works. A token that was revoked stays revoked.
+    """
+    query = select(api_tokens, users.c.active).join(users, users.c.id == api_tokens.c.user_id)
+    row = tx.conn.execute(query.where(api_tokens.c.token_hash == secret_hash(secret))).one_or_none()
+    if row is None:
+        create_token(tx, user_id, CONFIGURED, secret=secret)
+    elif row.revoked_at is not None:
+        return f"it was revoked on {wire_time(row.revoked_at)}"
+    elif not row.active or (row.expires_at is not None and row.expires_at <= tx.stamp):
+        return "its user is not active" if not row.active else f"it ended on {wire_time(row.expires_at)}"
+    others = (api_tokens.c.name == CONFIGURED) & (api_tokens.c.token_hash != secret_hash(secret))
+    gone = update(api_tokens).where(others, api_tokens.c.revoked_at.is_(None)).values(revoked_at=tx.stamp)
+    if tx.conn.execute(gone).rowcount:
+        note(tx, "token.revoked", CONFIGURED, "the environment has another")
+    return ""
+
+
+def check_configured_secret(secret: str) -> None:
+    """Raise ConfigError for a secret of the environment that others may guess or have read."""
+    if not secret.isascii() or not secret.isprintable() or " " in secret:
+        problem = "visible ASCII characters without spaces, got others"
+    elif _PLACEHOLDER.search(secret):
+        problem = "a secret of your own, got a placeholder that others know"
+    elif len(secret) < SHORTEST_SECRET:
+        problem = f"at least {SHORTEST_SECRET} characters, got {len(secret)}"
+    else:
+        return
+    raise ConfigError(f"{CONFIGURED}: wanted {problem}. This makes one: echo silo_$(openssl rand -hex 20)")
