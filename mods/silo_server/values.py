@@ -146,3 +146,9 @@ class Line(NamedTuple):
     child_current_revision: int
     child_archived: bool
     state: LineState
+
+    @property
+    def newer_revision_exists(self) -> bool:
+        """Return True if the line names an older revision of its child than the newest."""
+        pinned = self.state.child_revision
+        return pinned is not None and pinned < self.child_current_revision

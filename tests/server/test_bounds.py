@@ -34,7 +34,7 @@ from silo_server.services.bom import imports, tree
 from silo_server.services.bom.decisions import Decision, ReviewAction, resolve
 from silo_server.services.bom.last_sync import record_refusal
 from silo_server.services.bom.line_edit import add_line, change_line
-from silo_server.services.bom.lines import state_columns
+from silo_server.services.bom.line_state import state_columns
 from silo_server.services.bom.merge import merge_bom
 from silo_server.services.bom.merge_request import read_merge_request
 from silo_server.services.bom.summary import keep_all

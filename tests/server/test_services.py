@@ -36,7 +36,7 @@ from silo_server.services.access.tokens import (
 )
 from silo_server.services.access.users import create_user
 from silo_server.services.bom.line_edit import check_state, edited_state
-from silo_server.services.bom.lines import state_to_json, stored_state
+from silo_server.services.bom.line_state import state_to_json, stored_state
 from silo_server.services.bom.merge_request import read_merge_request
 from silo_server.services.bom.transfer import _numbered
 from silo_server.services.bom.tree import positive_number

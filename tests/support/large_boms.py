@@ -13,7 +13,7 @@ from typing import Any
 from server_testing import Api
 
 from silo_server.db.database import Database
-from silo_server.services.bom.lines import ChangeKind, ChangeNote, LineRecord, apply_changes, new_line_id
+from silo_server.services.bom.change import ChangeKind, ChangeNote, LineRecord, apply_changes, new_line_id
 from silo_server.services.items import NewItem, create_item, get_item
 from silo_server.settings import Settings
 from silo_server.values import LineState

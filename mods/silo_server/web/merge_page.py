@@ -32,7 +32,8 @@ from silo_server.services.bom import history, line_edit, review
 from silo_server.services.bom.assignees import assignee_of, editors
 from silo_server.services.bom.decisions import Decision, resolve
 from silo_server.services.bom.last_sync import in_sentences, last_sync
-from silo_server.services.bom.lines import LineId, component_of, line_of, lines_of, mark_of
+from silo_server.services.bom.line_state import mark_of
+from silo_server.services.bom.lines import LineId, component_of, line_of, lines_of
 from silo_server.services.bom.summary import summary_of
 from silo_server.services.items import get_item
 from silo_server.services.revisions import files_until, has_file

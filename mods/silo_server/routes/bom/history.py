@@ -21,7 +21,8 @@ from silo_server.routes.call import Editor, Viewer
 from silo_server.routes.models import RequestBody, Text
 from silo_server.routes.requests import ExpectedVersion, PageFrom
 from silo_server.services.bom import history
-from silo_server.services.bom.lines import line_state_to_wire, state_to_json
+from silo_server.services.bom.line_state import state_to_json
+from silo_server.services.bom.line_wire import line_state_to_wire
 from silo_server.services.items import get_item
 from silo_server.times import stamp
 from silo_server.values import Item, LineState

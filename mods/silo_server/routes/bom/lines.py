@@ -25,12 +25,8 @@ from silo_server.routes.requests import ExpectedVersion
 from silo_server.services.bom import line_edit
 from silo_server.services.bom.last_sync import NEVER, last_syncs
 from silo_server.services.bom.line_edit import Edited
-from silo_server.services.bom.lines import (
-    LineId,
-    check_line_count,
-    line_to_wire,
-    lines_of_many,
-)
+from silo_server.services.bom.line_wire import line_to_wire
+from silo_server.services.bom.lines import LineId, check_line_count, lines_of_many
 from silo_server.services.bom.review import told_quantities
 from silo_server.services.items import get_by_numbers, get_item
 from silo_server.values import Item, LineState

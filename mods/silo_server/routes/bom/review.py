@@ -18,7 +18,7 @@ from silo_server.routes.models import RequestBody, Short, Text
 from silo_server.routes.requests import ExpectedVersion
 from silo_server.services.bom import decisions, review
 from silo_server.services.bom.decisions import Decision, ReviewAction
-from silo_server.services.bom.lines import line_to_wire
+from silo_server.services.bom.line_wire import line_to_wire
 from silo_server.services.bom.summary import summary_of
 from silo_server.times import wire_time
 

@@ -18,7 +18,7 @@ from silo_server.routes.bom.summary import open_to_wire
 from silo_server.routes.call import Viewer
 from silo_server.routes.models import LineOut
 from silo_server.services.bom import tree
-from silo_server.services.bom.lines import child_to_wire, line_state_to_wire, revisions_to_wire
+from silo_server.services.bom.line_wire import child_to_wire, line_state_to_wire, revisions_to_wire
 from silo_server.services.bom.summary import standing_alone, summary_of
 from silo_server.services.items import get_item
 from silo_server.values import LineState

@@ -17,16 +17,14 @@ from silo.bom.quantities import counts_pieces
 from silo_server.db.tables import bom_conflicts
 from silo_server.db.transaction import Tx
 from silo_server.errors import LinesChangedError
-from silo_server.services.bom.lines import (
+from silo_server.services.bom.change import (
     ChangeKind,
     ChangeNote,
-    LineId,
     LineRecord,
     apply_changes,
-    component_of,
-    lines_of,
     parent_to_change,
 )
+from silo_server.services.bom.lines import LineId, component_of, lines_of
 from silo_server.services.bom.review import Conflict, marks_of, open_conflicts, review
 from silo_server.services.bom.waiting import conflicts_mark
 from silo_server.services.items import get_item

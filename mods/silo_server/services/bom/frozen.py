@@ -34,7 +34,7 @@ from silo_server.services.bom.history import (
     moment,
     what_changed,
 )
-from silo_server.services.bom.lines import state_to_json, stored_state
+from silo_server.services.bom.line_state import state_to_json, stored_state
 from silo_server.services.bom.summary import MassAndCost, OpenBom, Summary, summaries
 from silo_server.services.bom.tree import Graph, RolledItem, load_graph, order_of, with_supplier
 from silo_server.services.items import by_ids

@@ -27,17 +27,16 @@ from silo_server.db.tables import bom_change_lines, bom_changes, bom_conflicts, 
 from silo_server.db.transaction import Tx
 from silo_server.errors import ArchivedPartsError
 from silo_server.fields import from_row, names_of
-from silo_server.services.bom.lines import (
+from silo_server.services.bom.change import (
     ChangeKind,
     ChangeNote,
     LineRecord,
     apply_changes,
-    check_no_cycle,
-    lines_of,
-    lines_of_many,
     parent_to_change,
-    stored_state,
 )
+from silo_server.services.bom.cycles import check_no_cycle
+from silo_server.services.bom.line_state import stored_state
+from silo_server.services.bom.lines import lines_of, lines_of_many
 from silo_server.services.items import by_ids
 from silo_server.times import stamp
 from silo_server.values import Item, Line, LineState

@@ -42,18 +42,17 @@ from silo_server.db.tables import items
 from silo_server.db.transaction import Tx
 from silo_server.errors import TooLargeError
 from silo_server.schema import find_schema
-from silo_server.services.bom.line_edit import check_state, edited_state
-from silo_server.services.bom.lines import (
+from silo_server.services.bom.change import (
     ChangeKind,
     ChangeNote,
     LineRecord,
     apply_changes,
-    check_no_cycle,
-    find_rings,
-    lines_of,
     new_line_id,
     parent_to_change,
 )
+from silo_server.services.bom.cycles import check_no_cycle, find_rings
+from silo_server.services.bom.line_edit import check_state, edited_state
+from silo_server.services.bom.lines import lines_of
 from silo_server.services.items import (
     ItemQuery,
     NewItem,

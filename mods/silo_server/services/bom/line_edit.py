@@ -14,19 +14,17 @@ from silo.bom.text import character_problem
 from silo_server.db.transaction import Tx
 from silo_server.errors import DuplicateError, LinesChangedError
 from silo_server.schema import text_hints
-from silo_server.services.bom.lines import (
+from silo_server.services.bom.change import (
     ChangeKind,
     ChangeNote,
-    LineId,
     LineRecord,
     apply_changes,
-    check_no_cycle,
-    line_of,
-    lines_of,
-    mark_of,
     new_line_id,
     parent_to_change,
 )
+from silo_server.services.bom.cycles import check_no_cycle
+from silo_server.services.bom.line_state import mark_of
+from silo_server.services.bom.lines import LineId, line_of, lines_of
 from silo_server.services.field_checks import quantity_problem
 from silo_server.services.items import get_item
 from silo_server.user_json import json_problem

@@ -25,18 +25,18 @@ from silo_server.db.tables import bom_conflicts, items
 from silo_server.db.transaction import Tx
 from silo_server.events import announce
 from silo_server.fields import names_of
-from silo_server.services.bom.last_sync import LastSync, last_sync, record_merge
-from silo_server.services.bom.lines import (
+from silo_server.services.bom.change import (
     ChangeKind,
     ChangeNote,
     LineRecord,
     apply_changes,
-    check_no_cycle,
     check_version,
-    lines_of,
     locked_parent,
     new_line_id,
 )
+from silo_server.services.bom.cycles import check_no_cycle
+from silo_server.services.bom.last_sync import LastSync, last_sync, record_merge
+from silo_server.services.bom.lines import lines_of
 from silo_server.services.bom.merge_repeat import rebuilt, without_unchanged
 from silo_server.services.bom.merge_request import MergeRequestIn
 from silo_server.services.items import get_item

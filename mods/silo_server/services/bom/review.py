@@ -14,10 +14,8 @@ from silo_server.db.tables import (
 )
 from silo_server.db.transaction import Tx
 from silo_server.services.bom.history import Change, last_merge
-from silo_server.services.bom.lines import (
-    lines_of,
-    mark_of,
-)
+from silo_server.services.bom.line_state import mark_of
+from silo_server.services.bom.lines import lines_of
 from silo_server.services.bom.tree import Graph, conflicts_in
 from silo_server.services.items import get_item
 from silo_server.values import Item, Line

@@ -50,7 +50,7 @@ from silo_server.db.usage import uses_of
 from silo_server.events import log
 from silo_server.fields import names_of
 from silo_server.services.bom.last_sync import NEVER, last_syncs
-from silo_server.services.bom.lines import newer_exists, select_lines, to_line
+from silo_server.services.bom.lines import select_lines, to_line
 from silo_server.services.bom.tree import (
     MAX_DEPTH,
     Graph,
@@ -413,7 +413,7 @@ class _Maker:
         no_mass = (set() if worth.mass_whole else me).union(*(node.no_mass for node in unweighed))
         no_cost = (set() if worth.cost_whole else me).union(*(node.no_cost for node in nodes))
         assemblies = {part_id: counts for node in nodes for part_id, counts in node.assemblies.items()}
-        older = sum(newer_exists(line) for line in lines)
+        older = sum(line.newer_revision_exists for line in lines)
         summary = Summary(
             open=open_ones,
             worth=worth,
