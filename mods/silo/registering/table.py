@@ -23,7 +23,7 @@ from silo.registering.candidate import Candidate, CandidateFiles, ComponentState
 from silo.registering.offer import Offer
 from silo.registering.request import AS_UTF_8, ITEM_TYPES, RegistrationRequest, find_item, wrong_name
 from silo.registering.saved_file import fingerprint
-from silo.workbook import unicode_name
+from silo.workbook.encoding import unicode_name
 
 COLUMNS = (
     *("register", "file", "object", "standard", "name", "source", "supplier", "supplier_number"),

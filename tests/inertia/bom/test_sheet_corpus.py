@@ -11,7 +11,7 @@ import pytest
 from sheet_corpus import CASES, FORMATS, read_corpus
 
 from silo.inertia.bom.parser import BOMParser
-from silo.workbook import read_workbook
+from silo.workbook.read import read_workbook
 
 pytest.importorskip("xlrd")
 corpus = cache(read_corpus)

@@ -17,7 +17,7 @@ from sheet_corpus import read_corpus
 from silo.bom.errors import InputError
 from silo.inertia.bom.parser import BOMParser
 from silo.inertia.bom.table import BomCode
-from silo.workbook import read_workbook
+from silo.workbook.read import read_workbook
 
 openpyxl = pytest.importorskip("openpyxl")
 from openpyxl.styles import Font  # noqa: E402 - needs openpyxl
@@ -191,7 +191,7 @@ def test_a_stray_cell_in_a_far_corner_costs_nothing() -> None:
 
 def test_a_sheet_with_more_cells_than_a_bom_can_have_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever makes it so: cells that are repeated, wide lines, merged cells that overlap."""
-    monkeypatch.setattr("silo.workbook.MOST_CELLS", 5_000)
+    monkeypatch.setattr("silo.workbook.limits.MOST_CELLS", 5_000)
     cell = '<table:table-cell table:number-columns-repeated="1024"><text:p>x</text:p></table:table-cell>'
     row = f'<table:table-row table:number-rows-repeated="9">{cell}</table:table-row></table:table>'
     with pytest.raises(InputError, match="more than 5000 cells"):

@@ -15,7 +15,7 @@ from silo.inertia.bom.columns import MASS_COLUMNS
 from silo.inertia.bom.mass_cell import FORCE_UNITS, MassCell, column_mark, parse_mass, unit_factor
 from silo.inertia.bom.sheet import Sheet
 from silo.inertia.bom.table import BomCode, BOMEntry, BomTable, BomWarning
-from silo.workbook import SheetRow
+from silo.workbook.sheet import SheetRow
 
 _TOTAL_TOLERANCE = 1e-3
 """Relative, beside the rounding of both columns: how far a total may be from quantity times mass."""

@@ -23,7 +23,7 @@ from silo.inertia.bom.structure import (
     with_structure,
 )
 from silo.inertia.bom.table import BomCode, BOMEntry, BomTable, BomWarning
-from silo.workbook import SheetRow
+from silo.workbook.sheet import SheetRow
 
 
 class BOMParser:

@@ -18,7 +18,9 @@ from itertools import islice, zip_longest
 from silo.bom.errors import InputError, counted, listed
 from silo.inertia.bom.columns import MASS_COLUMNS, NAMING, Columns, find_columns
 from silo.inertia.bom.mass_header import read_mass_header
-from silo.workbook import STARTS, Grid, SheetRow, read_workbook, unicode_name
+from silo.workbook.encoding import STARTS, unicode_name
+from silo.workbook.read import read_workbook
+from silo.workbook.sheet import Grid, SheetRow
 
 MAX_BYTES = 64 * 1024 * 1024
 HEADER_WITHIN = 40

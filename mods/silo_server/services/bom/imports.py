@@ -23,7 +23,6 @@ from typing import Any, NamedTuple
 
 from sqlalchemy import select
 
-from silo import workbook
 from silo.api.wire import LineTexts
 from silo.bom.errors import InputError, RejectedError, listed
 from silo.bom.headers import (
@@ -37,6 +36,9 @@ from silo.bom.headers import (
 )
 from silo.bom.numbers import Mark, common_mark, parse_number, read_quantity, whole_number
 from silo.bom.quantities import exact_sum
+from silo.workbook.encoding import STARTS, unicode_name
+from silo.workbook.read import read_workbook
+from silo.workbook.sheet import Grid
 from silo_server.db.rows import one_of
 from silo_server.db.tables import items
 from silo_server.db.transaction import Tx
@@ -204,10 +206,10 @@ def as_csv(data: bytes, of: Table = BOM) -> bytes:
     RejectedError if several sheets hold such a table, or if lines are hidden or struck out: a person would
     not expect them to be read.
     """
-    if not data.startswith(workbook.STARTS):
+    if not data.startswith(STARTS):
         return data
     try:
-        sheets = [(grid, _sheet_text(grid)) for grid in workbook.read_workbook(data, "file")]
+        sheets = [(grid, _sheet_text(grid)) for grid in read_workbook(data, "file")]
     except InputError as error:
         raise RejectedError(str(error)) from None
     likely = [sheet for sheet in sheets if guess_of(sheet[1], of)]
@@ -229,7 +231,7 @@ def as_csv(data: bytes, of: Table = BOM) -> bytes:
     return text
 
 
-def _sheet_text(grid: workbook.Grid) -> bytes:
+def _sheet_text(grid: Grid) -> bytes:
     out = io.StringIO()
     writer, line = csv.writer(out), 1
     for row in grid.rows():
@@ -346,7 +348,7 @@ def _rows(text: str, delimiter: str) -> Iterator[list[str]]:
 
 
 def _decode(data: bytes) -> str:
-    if encoding := workbook.unicode_name(data):
+    if encoding := unicode_name(data):
         return data.decode(encoding, errors="replace")
     with suppress(UnicodeDecodeError):
         return data.decode()
