@@ -618,8 +618,9 @@ def kept(url: str, files: Path, parent: str) -> tuple[list[float], bytes | None]
     from silo.bom.errors import NotFoundError
     from silo_server.db.database import Database
     from silo_server.services.bom.lines import lines_of
+    from silo_server.services.file_store import FileStore
     from silo_server.services.items import get_item
-    from silo_server.services.revisions import FileStore, newest_file
+    from silo_server.services.revisions import newest_file
     from silo_server.settings import Settings
 
     db = Database(Settings(database_url=url))

@@ -63,7 +63,7 @@ from silo_server.db.transaction import EVENT_CHANNEL, MIGRATION_LOCK, Tx
 from silo_server.errors import cause_of
 from silo_server.events.log import HORIZON
 from silo_server.services import audit, search
-from silo_server.services.revisions import FileStore
+from silo_server.services.file_store import FileStore
 from silo_server.settings import Settings
 from silo_server.times import stamp, utc_now
 from silo_server.user_json import dumps

@@ -19,7 +19,7 @@ from silo_server.db.state import mode_of
 from silo_server.events import log
 from silo_server.events.hub import Hub
 from silo_server.housekeeping import last_run
-from silo_server.services.revisions import FileStore
+from silo_server.services.file_store import FileStore
 
 BUCKETS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0)
 SHARED = "PROMETHEUS_MULTIPROC_DIR"

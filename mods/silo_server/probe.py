@@ -17,7 +17,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from silo_server.db.database import Database
 from silo_server.db.state import mode_of
-from silo_server.services.revisions import FileStore
+from silo_server.services.file_store import FileStore
 
 # [s] How long /health and /ready wait for a probe.
 HEALTH_SECONDS, READY_SECONDS = 0.2, 2.0

@@ -57,7 +57,7 @@ from silo_server.services.access.configured_token import check_configured_secret
 from silo_server.services.access.login_links import create_login_link
 from silo_server.services.access.tokens import START_TOKEN, create_token, shown_prefix
 from silo_server.services.access.users import User, create_user, get_user, make_admin, to_user
-from silo_server.services.revisions import FileStore
+from silo_server.services.file_store import FileStore
 from silo_server.settings import MIB, Settings, settings_from_environment
 from silo_server.times import Clock, stamp, utc_now
 

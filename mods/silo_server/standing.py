@@ -19,7 +19,7 @@ from silo_server.db.turnstile import Turnstile
 from silo_server.events.hub import Hub
 from silo_server.housekeeping import last_run
 from silo_server.schema import find_schema
-from silo_server.services.revisions import FileStore
+from silo_server.services.file_store import FileStore
 
 
 def standing(db: Database, hub: Hub, files: FileStore, large_reads: Turnstile) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from silo_server import backup
 from silo_server.db.database import Database
 from silo_server.db.tables import metadata
 from silo_server.run import running_server
-from silo_server.services.revisions import FileStore
+from silo_server.services.file_store import FileStore
 from silo_server.settings import Settings
 
 TOKEN = "silo_backup"

@@ -13,7 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.bom.errors import NotFoundError
-from silo_server.services.revisions import MAX_THUMBNAIL, PNG, FileStore, clean_name, read_thumbnail
+from silo_server.services.file_store import FileStore, clean_name
+from silo_server.services.thumbnails import MAX_THUMBNAIL, PNG, read_thumbnail
 
 
 def fcstd(picture: bytes) -> bytes:

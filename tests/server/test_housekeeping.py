@@ -24,7 +24,7 @@ from silo_server.db.database import Database
 from silo_server.db.tables import answers, audit, bom_changes, events, sessions
 from silo_server.housekeeping import keep_tidy, last_run, tidy
 from silo_server.run import prepare, running_server
-from silo_server.services.revisions import FileStore
+from silo_server.services.file_store import FileStore
 from silo_server.services.search import rebuild_index
 from silo_server.settings import Settings
 

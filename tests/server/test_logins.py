@@ -32,8 +32,8 @@ from silo_server.services.access.tokens import (
     revoke_token,
 )
 from silo_server.services.access.users import change_user, create_user, row_of
+from silo_server.services.file_store import FileStore
 from silo_server.services.items import NewItem, create_item
-from silo_server.services.revisions import FileStore
 from silo_server.settings import Settings
 
 RIGHT, WRONG = "the right password", "a wrong password"

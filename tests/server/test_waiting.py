@@ -28,7 +28,7 @@ from silo_server.later import Later
 from silo_server.probe import Probe
 from silo_server.run import running_server
 from silo_server.services.access.tokens import actor_by_token, list_tokens, note_token_uses
-from silo_server.services.revisions import FileStore
+from silo_server.services.file_store import FileStore
 from silo_server.settings import Settings
 
 TOKEN = "silo_waiting"

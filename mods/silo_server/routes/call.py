@@ -23,7 +23,7 @@ from silo_server.routes.masked_secret import unmasked
 from silo_server.routes.requests import FORM_TYPES, form_of
 from silo_server.services.access.sessions import actor_by_session
 from silo_server.services.access.tokens import actor_by_token
-from silo_server.services.revisions import FileStore
+from silo_server.services.file_store import FileStore
 from silo_server.settings import Settings
 
 SESSION_COOKIE = "silo_session"

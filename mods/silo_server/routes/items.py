@@ -47,9 +47,19 @@ from silo_server.routes.models import (
 )
 from silo_server.routes.requests import ExpectedVersion, idempotency_key, json_body
 from silo_server.schema import describe, describe_form, find_schema, schemas
-from silo_server.services import items, revisions, scene, search
+from silo_server.services import documents, items, revisions, scene, search
 from silo_server.services.bom.last_sync import NEVER, LastSync, last_sync, last_syncs
 from silo_server.services.bom.tree import where_used
+from silo_server.services.documents import (
+    documents_by_uuid,
+    documents_holding,
+    find_document,
+    linked_from,
+    linking_to,
+    make_document,
+    shown,
+)
+from silo_server.services.drawn_picture import keep_picture
 from silo_server.services.field_checks import sha256_or_none, text_problem
 from silo_server.services.releases import draft_of
 from silo_server.services.revisions import RevisionOrigin, revision_to_wire
@@ -470,7 +480,7 @@ async def put_thumbnail(call: Editor, part_number: str) -> Response:
     def work() -> Response:
         with call.write() as tx:
             item = items.get_item(tx, part_number)
-            revisions.keep_picture(tx, call.server.files, item, picture)
+            keep_picture(tx, call.server.files, item, picture)
         return Response(status_code=204)
 
     return await anyio.to_thread.run_sync(work)
@@ -593,14 +603,14 @@ def document_at(uuid: str) -> Find:
 
     def find(tx: Tx, lock: bool) -> Item | Document:
         normal = items.normal_uuid(uuid)
-        document = revisions.find_document(tx, normal, lock=lock)
+        document = find_document(tx, normal, lock=lock)
         if document is None and (of := items.get_by_uuids(tx, [normal], include_archived=True)):
             return items.get_item(tx, of[0].part_number, lock=lock)
         if document is not None and document.item_id is not None:
             (item,) = items.by_ids(tx, [document.item_id]).values()
             return items.get_item(tx, item.part_number, lock=lock)
         if document is None:
-            return revisions.make_document(tx, normal) if lock else Document(0, normal, None, 0, "", "")
+            return make_document(tx, normal) if lock else Document(0, normal, None, 0, "", "")
         return document
 
     return find
@@ -610,7 +620,7 @@ def document_at(uuid: str) -> Find:
 def get_documents(call: Viewer, body: UuidsBody) -> Response:
     """Return the documents with these UUIDs; unknown ones are absent. Changes nothing: a viewer may ask."""
     with call.read() as tx:
-        documents = revisions.shown(tx, revisions.documents_by_uuid(tx, body.uuids))
+        documents = shown(tx, documents_by_uuid(tx, body.uuids))
     return json_answer({"documents": [to_wire(document) for document in documents]})
 
 
@@ -618,7 +628,7 @@ def get_documents(call: Viewer, body: UuidsBody) -> Response:
 def documents_of(call: Viewer, part_number: str) -> Response:
     """Return the documents that hold an item: its own file, and files of several parts that contain it."""
     with call.read() as tx:
-        documents = revisions.shown(tx, revisions.documents_holding(tx, items.get_item(tx, part_number)))
+        documents = shown(tx, documents_holding(tx, items.get_item(tx, part_number)))
     return json_answer({"documents": [to_wire(document) for document in documents]})
 
 
@@ -632,21 +642,21 @@ def get_document(call: Viewer, uuid: Uuid) -> Response:
 
 def told_of(tx: Tx, uuid: str) -> dict[str, Any]:
     """Describe a document and its links, for the API and the pages. Raises NotFoundError."""
-    document = revisions.get_document(tx, items.normal_uuid(uuid))
-    now = revisions.shown(tx, [document])
+    document = documents.get_document(tx, items.normal_uuid(uuid))
+    now = shown(tx, [document])
     if not now:
         raise NotFoundError(f"{document.subject} has no file yet")
     newest = revisions.get_revision(tx, document, document.current_revision)
-    near = {"linked": revisions.linked_from(tx, document), "used_by": revisions.linking_to(tx, document)}
+    near = {"linked": linked_from(tx, document), "used_by": linking_to(tx, document)}
     others = {
-        name: [to_wire(shown_document) for shown_document in revisions.shown(tx, linked)]
+        name: [to_wire(shown_document) for shown_document in shown(tx, linked)]
         for name, linked in near.items()
     }
     return {**to_wire(now[0]), "links": newest.links, **others}
 
 
 def _document(uuid: str) -> Find:
-    return lambda tx, _lock: revisions.get_document(tx, items.normal_uuid(uuid))
+    return lambda tx, _lock: documents.get_document(tx, items.normal_uuid(uuid))
 
 
 @by_uuid.get("/documents/{uuid}/revisions", response_model=list[RevisionOut])

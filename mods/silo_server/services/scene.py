@@ -30,7 +30,8 @@ from silo_server.db.tables import items as item_rows
 from silo_server.db.transaction import Tx
 from silo_server.errors import TooLargeError
 from silo_server.services import items
-from silo_server.services.revisions import FileStore, get_revision, newest_file, with_file
+from silo_server.services.file_store import FileStore
+from silo_server.services.revisions import get_revision, newest_file, with_file
 from silo_server.settings import MIB
 from silo_server.values import Item
 

@@ -26,8 +26,8 @@ from silo_server.routes.call import Call
 from silo_server.schema import find_schema
 from silo_server.services.bom import imports
 from silo_server.services.bom.imports import NOTHING, Allowed, Layout
+from silo_server.services.file_store import clean_name
 from silo_server.services.items import get_item
-from silo_server.services.revisions import clean_name
 from silo_server.web.accounts import Writer
 from silo_server.web.forms import Form, back, text, whole
 from silo_server.web.line_form import changes

@@ -27,7 +27,7 @@ from silo_server.errors import TooLargeError
 from silo_server.fields import names_of
 from silo_server.routes.items import told_of
 from silo_server.schema import ITEM_TYPES, find_schema
-from silo_server.services import revisions
+from silo_server.services import documents, revisions
 from silo_server.services.bom import tree
 from silo_server.services.bom.last_sync import in_sentences, last_sync
 from silo_server.services.bom.lines import lines_of_many
@@ -43,6 +43,7 @@ from silo_server.services.bom.summary import (
     summary_of,
 )
 from silo_server.services.bom.tree import RolledItem
+from silo_server.services.documents import documents_holding, get_document
 from silo_server.services.following import is_followed
 from silo_server.services.items import ItemQuery, get_item, list_items
 from silo_server.services.looks import last_look
@@ -377,7 +378,7 @@ def item_page(
         shown = structure_of(tx, item, look)
         history, revision_count = revisions.list_revisions(tx, item, before=revisions_before)
         used, uses = tree.where_used(tx, item, indirect=True, limit=MOST_USES, offset=used_from)
-        files = revisions.shown(tx, revisions.documents_holding(tx, item))
+        files = documents.shown(tx, documents_holding(tx, item))
         looked, now = last_look(tx, call.actor.own_id, item), tx.stamp
         release, following = state_of(tx, item), is_followed(tx, call.actor.own_id, item)
         beside = _beside(tx, look.beside)
@@ -414,7 +415,7 @@ def _beside(tx: Tx, part_number: str) -> dict[str, Any] | None:
         return None
     used, uses = tree.where_used(tx, item, limit=5)
     summary = at_once(tx, {item.id}).get(item.id)
-    files = revisions.shown(tx, revisions.documents_holding(tx, item))
+    files = documents.shown(tx, documents_holding(tx, item))
     values = {"item": item, "properties": shown_properties(item), "summary": summary, "files": files}
     return values | {"used": used, "uses": uses, "release": state_of(tx, item)}
 
@@ -424,7 +425,7 @@ def document_page(call: Reader, uuid: str) -> Response:
     """Show a file: the items in it, the files that it links to, those that use it, and its revisions."""
     with call.read() as tx:
         document_json = told_of(tx, uuid)
-        history, _ = revisions.list_revisions(tx, revisions.get_document(tx, document_json["id"]), PAGE_SIZE)
+        history, _ = revisions.list_revisions(tx, get_document(tx, document_json["id"]), PAGE_SIZE)
     return page(call, "document.html", file=document_json, revisions=history)
 
 

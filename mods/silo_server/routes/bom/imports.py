@@ -22,7 +22,7 @@ from silo_server.routes.made_files import XLSX
 from silo_server.routes.requests import FORM_TYPES, ExpectedVersion, idempotency_key
 from silo_server.services.bom import imports
 from silo_server.services.bom.change import locked_parent
-from silo_server.services.revisions import clean_name
+from silo_server.services.file_store import clean_name
 from silo_server.user_json import dumps
 
 router = bom_router("bom transfer")

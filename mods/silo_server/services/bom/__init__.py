@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""A BOM's lines: how they change, their history, the tree below and above, files in and out."""
+"""One BOM: its lines, how they change, and its history."""

@@ -52,7 +52,7 @@ from silo_server.services.items import (
     get_item,
 )
 from silo_server.services.releases import get_release
-from silo_server.services.revisions import png_size
+from silo_server.services.thumbnails import png_size
 from silo_server.times import wire_time
 from silo_server.user_json import dumps
 from silo_server.values import Item, Line
