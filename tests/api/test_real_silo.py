@@ -47,8 +47,10 @@ from silo.bom_sync.steps import Status, compare
 from silo.cli.connection import client_of
 from silo.cli.reading import read_assembly
 from silo.inertia.push import PushItem, PushPlan, push
-from silo.outbox.entry import Commit, State, pause_text
-from silo.outbox.send import Report, send_all
+from silo.outbox.entry import Commit, State
+from silo.outbox.report import Report
+from silo.outbox.send import send_all
+from silo.outbox.status_text import pause_text
 from silo.outbox.store import Store
 from silo.registering.closed_files import proposals_for, register_all
 from silo.registering.journal import RESERVED

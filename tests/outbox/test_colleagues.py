@@ -276,7 +276,7 @@ def test_a_server_that_was_set_back_gets_all_that_is_newer_by_one_press(vault: V
     mine(vault, b"five", b"four", bom=False)
     vault.send()
     assert [entry.state for entry in vault.waiting()] == [State.HELD] * 2
-    assert all(entry.reason.startswith("The server was set back: it has rev") for entry in vault.waiting())
+    assert all(entry.reason.startswith("The server was restored from a backup") for entry in vault.waiting())
     vault.send()
     assert len(vault.waiting()) == 2  # a person decides
     vault.send(force=True)

@@ -28,7 +28,8 @@ from silo.bom.errors import (
     UnreachableError,
 )
 from silo.outbox.entry import Commit, Entry, State
-from silo.outbox.send import Report, send_all
+from silo.outbox.report import Report
+from silo.outbox.send import send_all
 from silo.outbox.store import Store
 from silo.testing import FakeSilo
 

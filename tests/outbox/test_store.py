@@ -29,9 +29,10 @@ from silo.api.wire import Revision
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import DocumentError, InputError
 from silo.checksums import seen_as
-from silo.outbox.entry import VERSION, Commit, Entry, State, new_key
+from silo.outbox.entry import Commit, Entry, State, new_key
 from silo.outbox.send import send_all
 from silo.outbox.store import OutboxError, Store
+from silo.outbox.tables import VERSION
 from silo.platform import replacing, stamp_of
 from silo.testing import FakeSilo
 from vault import died

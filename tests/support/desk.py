@@ -18,7 +18,7 @@ from silo.api.wire import Item, Scene
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import DocumentError, NotFoundError, SiloError
 from silo.bom.findings import Finding
-from silo.outbox.send import Sent
+from silo.outbox.report import Sent
 from silo.platform import stamp_of
 from silo.registering.candidate import Candidate, ComponentState, OpenedFile
 from silo.registering.items import Registration

@@ -12,7 +12,8 @@ import pytest
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.outbox.entry import Commit, Entry
-from silo.outbox.send import Report, Sent, send_all
+from silo.outbox.report import Report, Sent
+from silo.outbox.send import send_all
 from silo.outbox.store import Store
 from silo.testing import FakeSilo
 from silo.workbench.documents.snapshot import Snapshot

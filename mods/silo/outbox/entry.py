@@ -20,19 +20,14 @@ moment that ``stage`` returns. ``key`` names it forever: it is the idempotency k
 from __future__ import annotations
 
 import json
-import math
-import sqlite3
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 from uuid import uuid4
 
-from silo.api.pause import Pause
 from silo.bom.entry import Extraction
-from silo.bom.errors import Translate, duration, english
 from silo.checksums import seen_as
 from silo.platform import Stamp
 
@@ -42,7 +37,7 @@ class State(StrEnum):
 
     KEEPING = "keeping"  # its row is on disk, the copy of its file is not yet
     WAITING = "waiting"  # will be sent
-    HELD = "held"  # a person decides: retry, send elsewhere, save a copy, discard
+    HELD = "held"  # the user decides: retry, send elsewhere, save a copy, discard
 
 
 def new_key() -> str:
@@ -57,11 +52,11 @@ UNKNOWN = "unknown"
 
 
 @dataclass(frozen=True)
-class Said:
+class CommitFields:
     """What stands in the row of a commit as the commit gives it.
 
     path, label
-        the document, and how people call it.
+        the document, and its name for users.
     taken_at
         seconds since 1970, UTC.
     identity, part_number
@@ -74,14 +69,14 @@ class Said:
     remark
         why there is no BOM though there might be one; shown when the file has arrived.
     origin
-        SHA-256 of the committed file that this one was made from, :data:`UNKNOWN`, or "": nobody asks whether
-        a colleague's newer revision is there (a file that has only just got its item).
+        SHA-256 of the committed file that this one was made from, :data:`UNKNOWN`, or "": a newer revision
+        of a colleague is not looked for (a file that has only just got its item).
     on_top_of
-        the newest revision that a person saw and sends this one on top of (:func:`on_top`).
+        the newest revision that the user saw and sends this one on top of (:func:`on_top`).
     document
         what is in a file that a project sends (:class:`InFile` as JSON); "" for the file of one item.
     renamed
-        its file has another name than the item's: :data:`ASKED` whether it is the same part, or a person's
+        its file has another name than the item's: :data:`ASKED` whether it is the same part, or the user's
         word that it is :data:`SAME_PART`.
     """
 
@@ -102,7 +97,7 @@ class Said:
 
 
 @dataclass(frozen=True)
-class Commit(Said):
+class Commit(CommitFields):
     """What is to be sent.
 
     file
@@ -151,7 +146,7 @@ class InFile:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Entry(Said):
+class Entry(CommitFields):
     """A row of the outbox.
 
     server
@@ -166,10 +161,10 @@ class Entry(Said):
     revision
         the revision that the file became.
     newer
-        the colleague's revision that it would undo, for a person to look at: its fields; empty where there is
+        the colleague's revision that it would undo, for the user to look at: its fields; empty where there is
         none.
     place, links
-        where the file is in its project, and JSON of what it links to; "" where nobody could look.
+        where the file is in its project, and JSON of what it links to; "" where it could not be read.
     stamp
         of its file at the commit, as JSON; "" where it was not looked at.
     superseded
@@ -213,149 +208,10 @@ class Entry(Said):
         return bool(here) and self.server not in ("", here)
 
 
-VERSION = 8
-TABLES = """
-CREATE TABLE entry (
-    id INTEGER PRIMARY KEY AUTOINCREMENT,
-    key TEXT NOT NULL UNIQUE,
-    server TEXT NOT NULL DEFAULT '',
-    state TEXT NOT NULL CHECK (state IN ('keeping', 'waiting', 'held')),
-    path TEXT NOT NULL,
-    label TEXT NOT NULL DEFAULT '',
-    identity TEXT NOT NULL DEFAULT '',
-    part_number TEXT NOT NULL DEFAULT '',
-    taken_at REAL NOT NULL,
-    comment TEXT NOT NULL DEFAULT '',
-    file_left INTEGER NOT NULL DEFAULT 0,
-    file_name TEXT NOT NULL DEFAULT '',
-    copy TEXT NOT NULL DEFAULT '',
-    sha256 TEXT NOT NULL DEFAULT '',
-    size INTEGER NOT NULL DEFAULT 0,
-    stamp TEXT NOT NULL DEFAULT '',        -- JSON; of the file at the commit
-    bom_left INTEGER NOT NULL DEFAULT 0,
-    allow_missing INTEGER NOT NULL DEFAULT 0,
-    remark TEXT NOT NULL DEFAULT '',
-    reason TEXT NOT NULL DEFAULT '',
-    base_revision INTEGER,
-    revision INTEGER,
-    origin TEXT NOT NULL DEFAULT '',
-    on_top_of TEXT NOT NULL DEFAULT '',    -- number and SHA-256
-    newer TEXT NOT NULL DEFAULT '',        -- JSON; "" where there is none
-    place TEXT NOT NULL DEFAULT '',
-    links TEXT NOT NULL DEFAULT '',        -- JSON; "" where nobody looked
-    renamed TEXT NOT NULL DEFAULT '',      -- '', 'asked', 'same part'
-    document TEXT NOT NULL DEFAULT '',     -- JSON; "" for the file of one item
-    extraction TEXT NOT NULL DEFAULT '',   -- JSON; "" where there is none
-    request TEXT NOT NULL DEFAULT ''       -- JSON; written before it is sent, and then sent again unchanged
-);
-CREATE TABLE sent (
-    server TEXT NOT NULL,
-    item TEXT NOT NULL COLLATE NOCASE,     -- a part number or an identity
-    kind TEXT NOT NULL CHECK (kind IN ('file', 'bom')),
-    entry_id INTEGER NOT NULL,             -- the newest entry that arrived
-    PRIMARY KEY (server, item, kind)
-);
-CREATE TABLE pause (
-    server TEXT NOT NULL,
-    item TEXT NOT NULL DEFAULT '',         -- '': of the whole server
-    until REAL NOT NULL,
-    reason TEXT NOT NULL,
-    code TEXT NOT NULL,
-    failures INTEGER NOT NULL,
-    told INTEGER NOT NULL,
-    PRIMARY KEY (server, item)
-);
-CREATE TABLE derived (
-    sha256 TEXT PRIMARY KEY,               -- a file that was saved, and not committed
-    origin TEXT NOT NULL,                  -- the committed file that it was made from
-    at REAL NOT NULL
-);
-CREATE TABLE known (
-    server TEXT NOT NULL,
-    sha256 TEXT NOT NULL,
-    item TEXT NOT NULL COLLATE NOCASE,     -- its identity
-    revision INTEGER NOT NULL,
-    PRIMARY KEY (server, sha256, item)
-);
-"""
-
-# All columns but those that may be large.
-_COLUMNS = ", ".join(field.name for field in fields(Entry) if field.name != "superseded")
-SELECT = f"""SELECT {_COLUMNS}, EXISTS (
-    SELECT 1 FROM sent s WHERE s.server = e.server AND s.item IN (e.identity, e.part_number) AND s.item <> ''
-    AND s.entry_id > e.id AND (s.kind = 'file' AND e.file_left OR s.kind = 'bom' AND e.bom_left)
-) AS superseded FROM entry e"""  # noqa: S608
-
-_FLAGS = ("file_left", "bom_left", "allow_missing", "superseded")
-
-
-def entry_of(row: sqlite3.Row) -> Entry:
-    """Make an entry from a row of :data:`SELECT`."""
-    values = dict(row)
-    values["state"] = State(values["state"])
-    values["newer"] = json.loads(values["newer"]) if values["newer"] else {}
-    return Entry(**values | {name: bool(values[name]) for name in _FLAGS})
-
-
 def on_top(comment: str, newer: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of a commit that a person sends on top of a newer revision that they saw."""
+    """Return the fields of a commit that is sent on top of a newer revision that the user saw."""
     number = newer["revision_number"]
     if not newer.get("set_back"):  # a server that was set back has nothing of a colleague
         who = f" by {newer['created_by']}" if newer.get("created_by") else ""
         comment = f"{comment} (on top of revision {number}{who}, which is not in it)".strip()
     return {"on_top_of": seen_as(number, newer.get("file_checksum")), "comment": comment}
-
-
-@dataclass(frozen=True)
-class Words:
-    """How an entry stands, in words: its state, and why. ``urgent``: a person decides."""
-
-    state: str
-    reason: str
-    urgent: bool
-
-
-def words(entry: Entry, here: str, *, is_paused: bool, translate: Translate = english) -> Words:
-    """Say in words how an entry stands, for the pane and the command line. ``here``: the address in use, ""
-    for none.
-    """
-    reason, urgent = entry.reason, entry.state is State.HELD or entry.is_away(here)
-    if entry.is_away(here):
-        meant = translate("Silo", "It is meant for {there}, which is not the server in use.")
-        reason = "\n".join(filter(None, (meant.replace("{there}", host_of(entry.server)), reason)))
-        state = translate("Silo", "for another server")
-    elif entry.superseded:
-        state = translate("Silo", "out of date")
-        reason = translate("Silo", "A newer commit of it has arrived since; this one would undo it.")
-    elif entry.state is State.HELD:
-        state = translate("Silo", "held for your choice")
-    elif entry.state is State.KEEPING:
-        state = translate("Silo", "being copied")
-        reason = reason or translate("Silo", "Its file is being copied.")
-    elif is_paused:
-        state = translate("Silo", "paused")
-    else:
-        state = translate("Silo", "tried again later") if reason else translate("Silo", "waiting")
-    return Words(state, reason, urgent)
-
-
-def parts(entry: Entry, translate: Translate = english) -> str:
-    """Say which part of an entry is not in Silo yet."""
-    if entry.file_left and entry.bom_left:
-        return translate("Silo", "file and BOM")
-    return translate("Silo", "BOM") if entry.bom_left else translate("Silo", "file")
-
-
-def pause_text(pause: Pause, server: str, now: float, translate: Translate = english) -> str:
-    """Say why nothing is sent to a server now, and until when."""
-    text = translate("Silo", "Nothing is sent to {host} before you retry: {reason}")
-    if not math.isinf(left := pause.left(now)):
-        text = translate("Silo", "Nothing is sent to {host} for {time}: {reason}")
-    for name, value in (("host", host_of(server)), ("time", duration(left)), ("reason", pause.reason)):
-        text = text.replace(f"{{{name}}}", value)
-    return text
-
-
-def host_of(address: str) -> str:
-    """Return the host of an address, for people."""
-    return urlsplit(address).netloc or address

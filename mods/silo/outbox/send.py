@@ -4,8 +4,6 @@
 For each entry: look the item up, send the file, compare the BOM, merge it. What has arrived is noted at
 once, so that a run which dies is continued by the next one. What an error means is :mod:`silo.api.policy`'s
 to say.
-
-What became of commits that were sent.
 """
 
 from __future__ import annotations
@@ -24,7 +22,6 @@ from silo.api.address import canonical
 from silo.api.arrived import MayHaveArrivedError, SentFile, find_arrived, is_there
 from silo.api.client import SiloClient
 from silo.api.files import DocumentId, Origin
-from silo.api.pause import Pause
 from silo.api.policy import QUEUE_PAUSES, Backoff, ErrorScope, Then, is_certain, judge, pause_after
 from silo.api.revisions import Standing, checksum_of, is_newest, newest_number, other_name, standing
 from silo.api.transport import Cancel, stop_if
@@ -32,12 +29,10 @@ from silo.api.wire import (
     HeldItem,
     LinkedFile,
     MergeRequest,
-    MergeResult,
     ProductSummary,
     Revision,
     SourceDocument,
 )
-from silo.bom.compare.merge import MergePlan
 from silo.bom.errors import (
     CancelledError,
     ConflictError,
@@ -57,69 +52,8 @@ from silo.bom_sync.reported_lines import remember_reported
 from silo.bom_sync.resolved import Resolved, resolve
 from silo.bom_sync.steps import Status, decide, merge_request, server_lines
 from silo.outbox.entry import ASKED, SAME_PART, Entry, InFile, State, new_key
+from silo.outbox.report import Report, Sent
 from silo.outbox.store import OutboxError, Store
-
-
-@dataclass(frozen=True)
-class Sent:
-    """What became of one commit.
-
-    status
-        of the BOM; None where there was none to sync.
-    plan
-        what was compared; None where the request was made by an earlier run.
-    revision
-        the file's new revision; None where it had none, or the server had this very file already.
-    sync_id
-        names the BOM's merge; "" where there was none to sync.
-    uploaded
-        the revision that the file became, as the server answered.
-    summary
-        what the server keeps of the product then; None where it does not say.
-    """
-
-    entry: Entry
-    part_number: str
-    status: Status | None = None
-    resolved: Resolved | None = None
-    plan: MergePlan | None = None
-    result: MergeResult | None = None
-    revision: int | None = None
-    sync_id: str = ""
-    uploaded: Revision | None = None
-    summary: ProductSummary | None = None
-
-    @property
-    def number(self) -> str:
-        """Return the item's part number; "" for a document without one."""
-        return "" if isinstance(self.part_number, DocumentId) else self.part_number
-
-    @property
-    def page(self) -> str:
-        """Return the address of the page for it on the server."""
-        return f"/items/{self.number}/bom" if self.number else f"/documents/{self.part_number}"
-
-
-@dataclass
-class Report:
-    """What became of a run.
-
-    sent, held, failed
-        commits that arrived; entries that a person must look at; entries that failed in passing.
-    stopped_by
-        why the run ended early: nothing answers, read-only, a wrong token, or a person's stop.
-    pause
-        why nothing is sent to this server now; None where all went well.
-    busy
-        another process or thread is sending.
-    """
-
-    sent: list[Sent] = field(default_factory=list)
-    held: list[Entry] = field(default_factory=list)
-    failed: list[Entry] = field(default_factory=list)
-    stopped_by: SiloError | None = None
-    pause: Pause | None = None
-    busy: bool = False
 
 
 def went_alone(entry: Entry) -> list[str]:
@@ -148,7 +82,7 @@ def send_all(
     item.
 
     force
-        end all pauses of this server first: a person pressed the button.
+        end all pauses of this server first: the user pressed the button.
     """
     with store.send_lock() as mine:
         if not mine:
@@ -168,7 +102,7 @@ def send_all(
 
 
 class _OtherNameError(ConflictError):
-    """The file has another name than the item's: a person says whether it is the same part."""
+    """The file has another name than the item's: the user says whether it is the same part."""
 
 
 class _PassingError(SiloError):
@@ -185,7 +119,7 @@ class _SendRun:
     backoff: Backoff
     chance: Callable[[], float]
     report: Report = field(default_factory=Report)
-    behind: set[str] = field(default_factory=set)  # items whose older entry has to go first
+    blocked_items: set[str] = field(default_factory=set)  # items whose older entry has to go first
     _documents: bool | None = None  # whether the server knows documents; None: not asked yet
     _sums_up: bool = True  # until it answers that it keeps no summaries
 
@@ -203,9 +137,9 @@ class _SendRun:
                 self.store.finish(due_entry.key)
             if (entry := self.store.entry(due_entry.id)) is None:
                 continue
-            is_ready = entry.state is State.WAITING and not entry.keys & self.behind
+            is_ready = entry.state is State.WAITING and not entry.keys & self.blocked_items
             if not is_ready or self._is_paused(entry.item):
-                self.behind |= entry.keys
+                self.blocked_items |= entry.keys
                 continue
             self._try(entry)
 
@@ -273,7 +207,7 @@ class _SendRun:
         self.store.update(entry.id, reason=reason)
         now = self.store.entry(entry.id) or entry
         self.report.failed.append(now)
-        self.behind |= now.keys
+        self.blocked_items |= now.keys
 
     def _reasons(self, entry: Entry, errors: Sequence[SiloError]) -> str:
         now = self.store.entry(entry.id) or entry
@@ -293,7 +227,7 @@ class _SendRun:
         extraction, request = self.store.bom(entry.id)
         resolved = self._resolved(entry, extraction) if extraction and entry.bom_left else None
         number = (resolved and resolved.assembly.part_number) or self._number(entry)
-        if number.casefold() in self.behind:
+        if number.casefold() in self.blocked_items:
             return None
         item, entry = entry.part_number, replace(entry, part_number=number)
         if not number:
@@ -311,10 +245,10 @@ class _SendRun:
                 # An upload whose answer was lost may have arrived, so it keeps its BOM back.
                 _refuse(error, refused, alone=is_certain(error))
                 if isinstance(error, MayHaveArrivedError):
-                    # A person who presses Retry has looked at these revisions.
+                    # A user who presses Retry has looked at these revisions.
                     self.store.update(entry.id, base_revision=error.newest)
                 if isinstance(error, NewerRevisionError):
-                    # So that a person can look at it.
+                    # So that the user can look at it.
                     self.store.update(entry.id, newer=json.dumps(dict(error.revision)))
                 if isinstance(error, NewerRevisionError | _OtherNameError):
                     return sent
@@ -413,7 +347,7 @@ class _SendRun:
         newest = self._revisions(sent.part_number, newest=1)
         if is_newest(entry.sha256, newest):
             there = self._arrived(entry, newest[0])
-            # The BOM is the BOM of that revision, also where this commit did not make it.
+            # The BOM is the BOM of that revision, even if another commit uploaded it.
             new = None if entry.base_revision is None else there.revision
             return replace(sent, entry=there, revision=new)
         if entry.base_revision is None:
@@ -445,8 +379,8 @@ class _SendRun:
 
     def _base(self, entry: Entry, revisions: Sequence[Revision]) -> int | None:
         """Return the revision from which the file was made; None if nothing is to be checked. Raises
-        NewerRevisionError if sending it would undo a colleague's; the server checks again, since somebody may
-        commit before the upload.
+        NewerRevisionError if sending it would undo a colleague's; the server checks again, since a colleague
+        may commit before the upload.
         """
         if not entry.origin:
             return None
@@ -471,8 +405,8 @@ class _SendRun:
         )
         if older == newest.revision_number and (before or (base is not None and base > older)):
             raise NewerRevisionError(
-                f"The server was set back: it has revision {older} of {entry.part_number}, and this is newer "
-                "and came after what it has lost. Retry all sends it again",
+                f"The server was restored from a backup: it has revision {older} of {entry.part_number}, and "
+                "this is newer and came after what it has lost. Retry all sends it again",
                 {**newest.model_dump(mode="json", exclude={"properties", "links"}), "set_back": True},
             )
 
@@ -482,7 +416,7 @@ class _SendRun:
 
     def _upload(self, entry: Entry, base: int | None) -> Revision:
         progress = self.on_progress
-        links = [LinkedFile.model_validate(load) for load in json.loads(entry.links)] if entry.links else None
+        links = [LinkedFile.model_validate(link) for link in json.loads(entry.links)] if entry.links else None
         held = [HeldItem(item=item, object=name) for item, name in InFile.of(entry.document).items]
         try:
             return self.client.upload_file(
@@ -496,7 +430,7 @@ class _SendRun:
                 origin=Origin(base_revision=base, file_path=entry.place, links=links, items=held or None),
                 cancelled=self.cancelled,
             )
-        except DocumentError as error:  # people know their own file, not our copy
+        except DocumentError as error:  # users know their own file, not our copy
             raise self._unreadable(entry, error.reason) from error
 
     def _copy(self, entry: Entry) -> Path:

@@ -37,19 +37,8 @@ from silo.bom.errors import ConflictError, DocumentError, InputError, counted
 from silo.bom.snapshot import to_plain
 from silo.checksums import content_hash
 from silo.folder_lock import folder_lock
-from silo.outbox.entry import (
-    ASKED,
-    SAME_PART,
-    SELECT,
-    TABLES,
-    VERSION,
-    Commit,
-    Entry,
-    Said,
-    State,
-    entry_of,
-    on_top,
-)
+from silo.outbox.entry import ASKED, SAME_PART, Commit, CommitFields, Entry, State, on_top
+from silo.outbox.tables import SELECT, TABLES, VERSION, entry_of
 from silo.platform import (
     data_folder,
     hold_lock,
@@ -65,7 +54,7 @@ from silo.platform import (
 
 # What a saved file was made from is forgotten after two years.
 _REMEMBERED = 2 * 366 * 86400.0
-# A copy of a file that was replaced is kept for so long, or until a person deletes it.
+# A copy of a file that was replaced is kept for so long, or until the user deletes it.
 KEPT_ASIDE_DAYS = 90
 _NEWEST_DAYS = 3
 
@@ -77,11 +66,11 @@ _LOST = "what belonged to it is lost: only {} is left. Save a copy and commit it
 
 
 class OutboxError(InputError):
-    """The outbox cannot be used now: its disk is full, its database is locked, or nobody may write there."""
+    """The outbox cannot be used now: its disk is full, its database is locked, or its folder is read-only."""
 
 
 class _ClosedError(OutboxError):
-    """Nobody may write there; what is there can be read."""
+    """Its folder is read-only; what is there can be read."""
 
 
 class QueueDatabase:
@@ -151,7 +140,7 @@ class QueueDatabase:
             self._is_ready = False  # if it is damaged, the next call makes it again
             raise OutboxError(
                 f"{self.path}: the outbox cannot be used now ({error}). What waits in it is still there. "
-                "Make room on the disk or mend its permissions, then try again"
+                "Make room on the disk or fix its permissions, then try again"
             ) from error
 
     def _make_ready(self) -> None:
@@ -175,7 +164,7 @@ class QueueDatabase:
                 text, again = f"{counted(waiting, 'commit')} in {self.copies} cannot be sent", "try again"
             raise _ClosedError(
                 f"{self.path}: the outbox cannot be written ({error.strerror or error}). {text}; make room "
-                f"or mend the permissions, then {again}"
+                f"or fix the permissions, then {again}"
             ) from error
         with self._translated():
             if not self._is_whole():
@@ -293,7 +282,7 @@ class QueueDatabase:
             for before in rows:
                 if table != "entry" or before.get("key") not in {None, *gone}:
                     _insert(db, table, before)
-        for key in lost.keys() - _keys(db) - gone:  # so that a person sees it
+        for key in lost.keys() - _keys(db) - gone:  # so that the user sees it
             copy = lost[key]
             reason = _LOST.format("a copy of its file" if copy else "its name")
             row = {"key": key, "state": State.HELD, "path": "", "taken_at": self.clock(), "reason": reason}
@@ -462,7 +451,7 @@ class Store(FileOrigins):
         """Put a commit's row on disk, which takes no time; the caller then calls :meth:`finish`."""
         if commit.file is None and commit.extraction is None and not commit.request:
             raise InputError(f"{commit.path or commit.part_number}: neither a file nor a BOM to keep")
-        row = {field.name: getattr(commit, field.name) for field in fields(Said)} | {
+        row = {field.name: getattr(commit, field.name) for field in fields(CommitFields)} | {
             "server": canonical(server) if server else "",
             "state": State.KEEPING if commit.file is not None else State.WAITING,
             "stamp": json.dumps(commit.stamp) if commit.stamp else "",
@@ -580,19 +569,19 @@ class Store(FileOrigins):
             raise InputError(f"{commit.path}: discarded while its copy was made")
         return entry
 
-    # -- what a person decides --------------------------------------------------------------------------
+    # -- what the user decides --------------------------------------------------------------------------
 
     def retry(self, entry_id: int, server: str | None = None) -> None:
         """Let an entry be sent with the next run; ``server`` sends it there instead (the server moved).
 
-        For a file with another name than the item's, the person confirms that it is the same part. Raises
+        For a file with another name than the item's, the user confirms that it is the same part. Raises
         :class:`ConflictError` if something newer of the same item has arrived since.
         """
         entry = self._existing(entry_id)
         if entry.superseded:
             raise ConflictError(
-                f"{entry.part_number or entry.label}: a newer commit of it was sent since, and this commit "
-                "would undo that. Discard this commit"
+                f"{entry.part_number or entry.label}: a newer commit was sent; this one would "
+                "overwrite it. Discard this commit"
             )
         ready = State.WAITING if entry.sha256 or not entry.file_left else State.KEEPING
         renamed = SAME_PART if entry.renamed == ASKED else entry.renamed
@@ -672,8 +661,8 @@ class Store(FileOrigins):
         return self._entry_where("e.key = ?", key)
 
     def next_due(self, server: str, after: int) -> Entry | None:
-        """Return the oldest entry after ``after`` that may be sent to a server without a decision of a
-        person.
+        """Return the oldest entry after ``after`` that may be sent to a server without a decision of
+        the user.
         """
         where = "e.state <> 'held' AND e.server IN ('', ?) AND e.id > ? ORDER BY e.id LIMIT 1"
         return self._entry_where(where, canonical(server), after)
@@ -688,9 +677,9 @@ class Store(FileOrigins):
         """Set columns of an entry."""
         columns = ", ".join(f"{name} = :{name}" for name in values)
         with self.transaction() as db:
-            row = {**values, "id": entry_id}
-            for row_updated in db.execute(f"UPDATE entry SET {columns} WHERE id = :id RETURNING key", row):  # noqa: S608
-                self._describe(db, row_updated[0])
+            parameters = {**values, "id": entry_id}
+            for row in db.execute(f"UPDATE entry SET {columns} WHERE id = :id RETURNING key", parameters):  # noqa: S608
+                self._describe(db, row[0])
 
     def arrived(
         self,
@@ -705,7 +694,7 @@ class Store(FileOrigins):
         removed with its copy; until then, a server that is restored from a backup may need the copy again.
 
         base
-            the revision that the file was made from. A BOM of that revision that still waits for a person may
+            the revision that the file was made from. A BOM of that revision that still waits for the user may
             be sent although its file is no longer the newest, because everything newer comes from here.
         note
             False: it was not sent, and makes nothing older out of date.

@@ -17,7 +17,7 @@ from silo.workbench.settings.preferences import GROUP, Preferences
 from silo.workbench.words import plain, translate
 
 if TYPE_CHECKING:
-    from silo.outbox.send import Sent
+    from silo.outbox.report import Sent
     from silo.workbench.buttons import Buttons
     from silo.workbench.colleagues.announced import Newer
     from silo.workbench.commit.flow import CommitFlow

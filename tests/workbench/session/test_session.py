@@ -21,7 +21,8 @@ from silo.api.wire import MergeEvent, MergeResult
 from silo.bom.errors import SiloError, UnreachableError
 from silo.bom_sync.steps import Status
 from silo.outbox.entry import UNKNOWN, Commit, Entry, State
-from silo.outbox.send import Sent, send_all
+from silo.outbox.report import Sent
+from silo.outbox.send import send_all
 from silo.outbox.store import OutboxError, Store
 from silo.platform import stamp_of
 from silo.workbench.documents.opened import DocumentOrigin

@@ -17,7 +17,7 @@ from silo.cli.progress import set_sending_step, set_step
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
-    from silo.outbox.send import Report
+    from silo.outbox.report import Report
     from silo.vault.project import Belonging, FileStanding
 
 
@@ -66,7 +66,8 @@ def run_commit(args: argparse.Namespace) -> int:
     """Send what differs, through the queue. Returns 1 if anything is not in Silo afterwards; 3 if the server
     does not answer: then the queue keeps everything that the project does not remember as sent.
     """
-    from silo.outbox.send import Report, send_all
+    from silo.outbox.report import Report
+    from silo.outbox.send import send_all
     from silo.outbox.store import Store
     from silo.vault.project import (
         ProjectState,

@@ -98,9 +98,9 @@ def _show_queue(
     from rich.text import Text
 
     from silo.cli.terminal import console, plain, table_of
-    from silo.outbox.entry import parts, pause_text, words
+    from silo.outbox.status_text import parts, pause_text, status_text
 
-    queue_rows = [(pending, words(pending, here, is_paused=pause is not None)) for pending in left]
+    queue_rows = [(pending, status_text(pending, here, is_paused=pause is not None)) for pending in left]
     notice = pause_text(pause, here, now) if pause is not None else ""
     if args.json:
         rows = [

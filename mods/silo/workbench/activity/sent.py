@@ -19,7 +19,7 @@ from silo.bom_sync.activity_text import (
 )
 from silo.bom_sync.resolved import Resolved
 from silo.bom_sync.steps import Status
-from silo.outbox.send import Sent
+from silo.outbox.report import Sent
 from silo.workbench.activity.badges import badges
 from silo.workbench.activity.box import (
     Action,

@@ -12,7 +12,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from silo.outbox.entry import host_of, pause_text
+from silo.outbox.status_text import host_of, pause_text
 from silo.workbench.activity.box import Action, Do, EntryLine, PaneEntry
 from silo.workbench.activity.feed import gathered
 from silo.workbench.gui import widgets

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from silo.api.address import canonical
-from silo.outbox.entry import ASKED, State, host_of, parts, words
+from silo.outbox.entry import ASKED, State
 from silo.outbox.entry import Entry as QueueEntry
+from silo.outbox.status_text import host_of, parts, status_text
 from silo.workbench.activity.box import Action, Do
 from silo.workbench.words import counted, plain, spoken, translate
 
@@ -112,7 +113,7 @@ def _is_urgent(entry: QueueEntry, here: str) -> bool:
 
 
 def _row(entry: QueueEntry, here: str, theirs: Theirs | None, pause: Pause | None, said: str) -> WaitingRow:
-    row_words = words(entry, here, is_paused=pause is not None, translate=translate)
+    row_words = status_text(entry, here, is_paused=pause is not None, translate=translate)
     text = "" if row_words.reason == said else row_words.reason
     details: list[str] = []
     more: tuple[Action, ...] = ()

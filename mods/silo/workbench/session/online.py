@@ -13,7 +13,8 @@ from silo.api.pause import Pause
 from silo.api.sse import RESET, ServerEvent
 from silo.bom.errors import ConfigError, InputError
 from silo.outbox.entry import Entry as Waiting
-from silo.outbox.send import Report, Sent, send_all
+from silo.outbox.report import Report, Sent
+from silo.outbox.send import send_all
 from silo.outbox.store import Store
 from silo.workbench.activity.box import PaneEntry
 from silo.workbench.activity.events import commit_of_event, of_event

@@ -28,7 +28,7 @@ from silo.workbench.words import spoken, translate
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
     from silo.api.pause import Pause
-    from silo.outbox.send import Sent
+    from silo.outbox.report import Sent
     from silo.workbench.colleagues.theirs import Theirs
     from silo.workbench.documents.opened import DocumentOrigin
     from silo.workbench.session.online import Online

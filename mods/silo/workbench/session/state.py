@@ -15,7 +15,7 @@ from silo.workbench.settings.server import ServerChoice
 
 if TYPE_CHECKING:
     from silo.api.pause import Pause
-    from silo.outbox.send import Sent
+    from silo.outbox.report import Sent
     from silo.workbench.colleagues.theirs import Theirs
 
 

@@ -595,7 +595,7 @@
         </message>
         <message>
             <location filename="../../freecad/silo_group.py" />
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>in Silo</source>
             <translation type="unfinished" />
         </message>
@@ -615,31 +615,83 @@
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../gui/widgets.py" />
-            <location filename="../../mass/flow.py" />
-            <location filename="../../preview/dialog.py" />
-            <location filename="../../register/dialog.py" />
-            <location filename="../../revisions/dialog.py" />
-            <location filename="../../settings/page.py" />
-            <source>Close</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../gui/widgets.py" />
+            <location filename="../../gui/closing.py" />
             <location filename="../../settings/page.py" />
             <location filename="../../start.py" />
             <source>Silo</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../gui/widgets.py" />
+            <location filename="../../gui/closing.py" />
             <source>Your commits are being copied to the outbox. They are sent when FreeCAD is started the next time.
 Commits that are not copied by then may have to be committed again.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../gui/widgets.py" />
+            <location filename="../../gui/closing.py" />
             <source>Close without waiting</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/widgets.py" />
+            <location filename="../../mass/dialog.py" />
+            <location filename="../../preview/dialog.py" />
+            <location filename="../../register/dialog.py" />
+            <location filename="../../revisions/dialog.py" />
+            <location filename="../../settings/install.py" />
+            <source>Close</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <source>Mass of {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <source>Copy the table, for a spreadsheet</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <source>Copy</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <location filename="../../register/rows.py" />
+            <source>Part</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <source>Quantity</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <source>Mass of one</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <source>Mass</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <source>Volume of one, cm³</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <source>Material</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <location filename="../../register/dialog.py" />
+            <source>Remarks</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -650,78 +702,6 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../mass/flow.py" />
             <source>This FreeCAD's Python has no numpy, which masses need.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <source>Measuring {name}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <source>Reading the assembly…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <source>Part {n} of {total}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <source>face {n} of {total}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <source>Mass of {name}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <source>Copy the table, for a spreadsheet</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <source>Copy</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <location filename="../../register/flow.py" />
-            <source>Part</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <source>Quantity</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <source>Mass of one</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <source>Mass</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <source>Volume of one, cm³</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <source>Material</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <location filename="../../register/dialog.py" />
-            <source>Remarks</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -760,6 +740,26 @@ Commits that are not copied by then may have to be committed again.</source>
             <translation type="unfinished" />
         </message>
         <message>
+            <location filename="../../mass/waiting.py" />
+            <source>Measuring {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/waiting.py" />
+            <source>Reading the assembly…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/waiting.py" />
+            <source>Part {n} of {total}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/waiting.py" />
+            <source>face {n} of {total}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
             <location filename="../../packages.py" />
             <source>Silo needs the Python packages {names}. Install them with silo-mod install-addon, or with: {command} – then start FreeCAD again.</source>
             <translation type="unfinished" />
@@ -783,13 +783,13 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../pane/banner.py" />
-            <location filename="../../settings/page.py" />
+            <location filename="../../settings/install.py" />
             <source>Try again</source>
             <translation type="unfinished" />
         </message>
         <message>
             <location filename="../../pane/banner.py" />
-            <location filename="../../settings/page.py" />
+            <location filename="../../settings/install.py" />
             <source>Install What Silo Needs…</source>
             <translation type="unfinished" />
         </message>
@@ -870,7 +870,7 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../pane/dock.py" />
-            <location filename="../../settings/page.py" />
+            <location filename="../../settings/install.py" />
             <source>Database Activity</source>
             <translation type="unfinished" />
         </message>
@@ -965,7 +965,7 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../preview/dialog.py" />
-            <location filename="../../register/flow.py" />
+            <location filename="../../register/rows.py" />
             <source>Assembly</source>
             <translation type="unfinished" />
         </message>
@@ -1062,131 +1062,6 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../preview/flow.py" />
-            <source>Without a part number: left out until registered</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>Not counted, or counted with a remark</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>missing: {file}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>… more rows than can be shown here</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>new in the assembly: will be added</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>will take the assembly's quantity</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>manual line in Silo with another quantity: a person decides there</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>not in the assembly: kept, marked unreferenced</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>manual line: not touched</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>its file is missing: the line stays as it is</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>its own BOM is not in Silo yet</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>its own BOM differs from Silo</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>{n} to add</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>{n} with another quantity</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>{n} unreferenced</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>{n} in conflict</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>{n} without a part number</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>{n} missing</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>{n} sub-assembly is not in Silo yet</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>{n} sub-assemblies are not in Silo yet</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>{n} sub-assembly differs from Silo</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>{n} sub-assemblies differ from Silo</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>{n} line agrees</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>{n} lines agree</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>Nothing to sync: all {n} lines agree with Silo.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
             <source>{name} holds no assembly, so it has no BOM.</source>
             <translation type="unfinished" />
         </message>
@@ -1209,6 +1084,131 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../preview/flow.py" />
             <source>Nothing was synced: {name} was edited since the comparison. Here it is now.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>Without a part number: left out until registered</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>Not counted, or counted with a remark</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>missing: {file}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>… more rows than can be shown here</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>new in the assembly: will be added</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>will take the assembly's quantity</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>manual line in Silo with another quantity: a person decides there</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>not in the assembly: kept, marked unreferenced</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>manual line: not touched</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>its file is missing: the line stays as it is</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>its own BOM is not in Silo yet</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>its own BOM differs from Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} to add</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} with another quantity</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} unreferenced</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} in conflict</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} without a part number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} missing</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} sub-assembly is not in Silo yet</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} sub-assemblies are not in Silo yet</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} sub-assembly differs from Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} sub-assemblies differ from Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} line agrees</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} lines agree</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>Nothing to sync: all {n} lines agree with Silo.</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1379,286 +1379,6 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../register/flow.py" />
-            <source>Components</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>Standard parts</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>Modelled in this file, not counted</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>Modelled in this file, and counted</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>Modelled in this file, not a part</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>Consumable</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>Tool</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>made here</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>bought</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>not stated</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>all rows</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>unsure</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>new</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>probable duplicates</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>its unsaved edits are saved too</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>open in another FreeCAD: close it there first, or saving there undoes this</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>the file is read-only</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>has edits, but is loaded only in part: open the file itself first</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>has changed on disk since you opened it: open it again first</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>the file is missing</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>has no file yet: save it first</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>made by a newer FreeCAD: cannot be saved here</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>Standard part: {name}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>{name} ({n} copies)</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>{number} (kept)</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>same or new part?</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>one for each</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>{number} or later</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>{number} (new)</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>same part: keep {number}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>new part: a new number</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>a new number</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>different parts: a number for each copy</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>stays as it is</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>registered</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>registering…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>as you chose in this folder before</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>not a part: not listed again</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>counts once</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>counts {n} times</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>would count once; check it if it is a part</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>would count {n} times; check it if it is a part</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>imported from {file}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>equal by their labels only</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>carries the identity of {number}, as another file does</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>registered at another server: it keeps its identity</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>the same content as {name}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>Silo has this very file as {number}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>Silo has {number} with the same name</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>Silo was not searched for parts that look alike: {problem}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>All components of {name} have their Silo part number.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>All of these have their part number now.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>Where files carry one identity, choose in the column Part number: the same part, or a new one?</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>({n} more after these)</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>The following component has no Silo part number and will be excluded from the BOM until registered:</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>The following components have no Silo part number and will be excluded from the BOM until registered:</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
             <source>Looking for components without a part number</source>
             <translation type="unfinished" />
         </message>
@@ -1685,6 +1405,286 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../register/flow.py" />
             <source>Registered</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Components</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Standard parts</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Modelled in this file, not counted</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Modelled in this file, and counted</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Modelled in this file, not a part</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Consumable</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Tool</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>made here</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>bought</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>not stated</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>all rows</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>unsure</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>new</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>probable duplicates</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>its unsaved edits are saved too</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>open in another FreeCAD: close it there first, or saving there undoes this</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>the file is read-only</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>has edits, but is loaded only in part: open the file itself first</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>has changed on disk since you opened it: open it again first</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>the file is missing</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>has no file yet: save it first</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>made by a newer FreeCAD: cannot be saved here</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Standard part: {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>{name} ({n} copies)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>{number} (kept)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>same or new part?</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>one for each</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>{number} or later</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>{number} (new)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>same part: keep {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>new part: a new number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>a new number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>different parts: a number for each copy</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>stays as it is</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>registered</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>registering…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>as you chose in this folder before</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>not a part: not listed again</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>counts once</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>counts {n} times</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>would count once; check it if it is a part</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>would count {n} times; check it if it is a part</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>imported from {file}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>equal by their labels only</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>carries the identity of {number}, as another file does</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>registered at another server: it keeps its identity</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>the same content as {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Silo has this very file as {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Silo has {number} with the same name</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Silo was not searched for parts that look alike: {problem}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>All components of {name} have their Silo part number.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>All of these have their part number now.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Where files carry one identity, choose in the column Part number: the same part, or a new one?</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>({n} more after these)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>The following component has no Silo part number and will be excluded from the BOM until registered:</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>The following components have no Silo part number and will be excluded from the BOM until registered:</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1894,21 +1894,6 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../revisions/flow.py" />
-            <source>The ghost is removed.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../revisions/flow.py" />
-            <source>Ghost: {removed} only in revision {n}, {moved} elsewhere there. Only here: {added}.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../revisions/flow.py" />
-            <source>Not compared: {unknown} in groups and arrays without links.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../revisions/flow.py" />
             <source>Silo has no model of revision {n} yet.</source>
             <translation type="unfinished" />
         </message>
@@ -1963,92 +1948,107 @@ Commits that are not copied by then may have to be committed again.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/ghosts.py" />
+            <source>The ghost is removed.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/ghosts.py" />
+            <source>Ghost: {removed} only in revision {n}, {moved} elsewhere there. Only here: {added}.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/ghosts.py" />
+            <source>Not compared: {unknown} in groups and arrays without links.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/project.py" />
             <source>not in Silo</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>edited since its commit</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>newer in Silo</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>edited, and newer in Silo</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>waits to be sent</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>its item is not on this server</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>unsaved edits</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>was {place}</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>{n} files, {left} of them different from Silo</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>Looking at the project</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>{place} links to {name}, which is not there.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>{place} links to {name}, outside the project: it is not sent.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>{place} cannot be read: {name}</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>{place} is a copy of {name}, which has the item.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>{place} is gone since its commit.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/pulled.py" />
             <source>{name} has edits that are not in Silo; it was left alone.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/pulled.py" />
             <source>{name} is open in FreeCAD; it was left alone.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/pulled.py" />
             <source>{path}, which {name} links to, was not fetched: {reason}</source>
             <translation type="unfinished" />
         </message>
@@ -2090,6 +2090,127 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../session/session.py" />
             <source>Outbox</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>Enter the server's address too: a token belongs to its server.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>Enter the address of the server first.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>Connected as {user} ({role}); the server is in {mode} mode.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>This server has no page for a login. Make a token on its account page.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>No server is set up. To try it out, run: silo-mod serve</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>from the environment variable SILO_API_URL</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>from this page</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>from the configuration file of silo-mod</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>Token: from the environment variable SILO_API_TOKEN.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>Token: from the system's keyring.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>Token: from FreeCAD's preferences, a plain file.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>Token: from the configuration file of silo-mod.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>Token: none.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>In use: {url} ({from}).</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>SILO_SSL_VERIFY decides about the certificate.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/help.py" />
+            <source>Help on Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/help.py" />
+            <source>The documentation is not there: {path}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/install.py" />
+            <source>Silo cannot start yet: FreeCAD's Python lacks {names}.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/install.py" />
+            <source>Install what Silo needs</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/install.py" />
+            <source>Silo needs these Python packages: {names}.
+They are installed in {folder}.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/install.py" />
+            <source>Install</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/install.py" />
+            <source>Installing. This takes a minute or two…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/install.py" />
+            <source>The packages are in {folder}. Start FreeCAD again to use Silo.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/install.py" />
+            <source>They could not be installed: {reason}</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -2253,127 +2374,6 @@ Commits that are not copied by then may have to be committed again.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../settings/page.py" />
-            <source>Help on Silo</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/page.py" />
-            <source>The documentation is not there: {path}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/page.py" />
-            <source>Silo cannot start yet: FreeCAD's Python lacks {names}.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/page.py" />
-            <source>Install what Silo needs</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/page.py" />
-            <source>Silo needs these Python packages: {names}.
-They are installed in {folder}.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/page.py" />
-            <source>Install</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/page.py" />
-            <source>Installing. This takes a minute or two…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/page.py" />
-            <source>The packages are in {folder}. Start FreeCAD again to use Silo.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/page.py" />
-            <source>They could not be installed: {reason}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>Enter the server's address too: a token belongs to its server.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>Enter the address of the server first.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>Connected as {user} ({role}); the server is in {mode} mode.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>This server has no page for a login. Make a token on its account page.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>No server is set up. To try it out, run: silo-mod serve</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>from the environment variable SILO_API_URL</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>from this page</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>from the configuration file of silo-mod</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>Token: from the environment variable SILO_API_TOKEN.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>Token: from the system's keyring.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>Token: from FreeCAD's preferences, a plain file.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>Token: from the configuration file of silo-mod.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>Token: none.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>In use: {url} ({from}).</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>SILO_SSL_VERIFY decides about the certificate.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
             <location filename="../../start.py" />
             <source>Silo is installed more than once: {folders}. Only {used} is used; remove the others.</source>
             <translation type="unfinished" />
@@ -2444,77 +2444,77 @@ They are installed in {folder}.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>It is meant for {there}, which is not the server in use.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>for another server</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>out of date</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>A newer commit of it has arrived since; this one would undo it.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>held for your choice</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>being copied</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>Its file is being copied.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>paused</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>tried again later</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>waiting</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>file and BOM</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>BOM</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>file</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>Nothing is sent to {host} before you retry: {reason}</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>Nothing is sent to {host} for {time}: {reason}</source>
             <translation type="unfinished" />
         </message>
@@ -2657,12 +2657,12 @@ They are installed in {folder}.</source>
     <context>
         <name>Silo_InstallPackages</name>
         <message>
-            <location filename="../../settings/page.py" />
+            <location filename="../../settings/install.py" />
             <source>Install What Silo Needs…</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../settings/page.py" />
+            <location filename="../../settings/install.py" />
             <source>Install the Python packages that Silo needs</source>
             <translation type="unfinished" />
         </message>

@@ -595,7 +595,7 @@
         </message>
         <message>
             <location filename="../../freecad/silo_group.py" />
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>in Silo</source>
             <translation>in Silo</translation>
         </message>
@@ -615,33 +615,85 @@
             <translation>Was Silo über diese Komponente weiß</translation>
         </message>
         <message>
-            <location filename="../../gui/widgets.py" />
-            <location filename="../../mass/flow.py" />
-            <location filename="../../preview/dialog.py" />
-            <location filename="../../register/dialog.py" />
-            <location filename="../../revisions/dialog.py" />
-            <location filename="../../settings/page.py" />
-            <source>Close</source>
-            <translation>Schließen</translation>
-        </message>
-        <message>
-            <location filename="../../gui/widgets.py" />
+            <location filename="../../gui/closing.py" />
             <location filename="../../settings/page.py" />
             <location filename="../../start.py" />
             <source>Silo</source>
             <translation>Silo</translation>
         </message>
         <message>
-            <location filename="../../gui/widgets.py" />
+            <location filename="../../gui/closing.py" />
             <source>Your commits are being copied to the outbox. They are sent when FreeCAD is started the next time.
 Commits that are not copied by then may have to be committed again.</source>
             <translation>Eingechecktes wird gerade in den Postausgang kopiert. Gesendet wird es beim nächsten Start von FreeCAD.
 Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.</translation>
         </message>
         <message>
-            <location filename="../../gui/widgets.py" />
+            <location filename="../../gui/closing.py" />
             <source>Close without waiting</source>
             <translation>Schließen, ohne zu warten</translation>
+        </message>
+        <message>
+            <location filename="../../gui/widgets.py" />
+            <location filename="../../mass/dialog.py" />
+            <location filename="../../preview/dialog.py" />
+            <location filename="../../register/dialog.py" />
+            <location filename="../../revisions/dialog.py" />
+            <location filename="../../settings/install.py" />
+            <source>Close</source>
+            <translation>Schließen</translation>
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <source>Mass of {name}</source>
+            <translation>Masse von {name}</translation>
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <source>Copy the table, for a spreadsheet</source>
+            <translation>Die Tabelle kopieren, für eine Tabellenkalkulation</translation>
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <source>Copy</source>
+            <translation>Kopieren</translation>
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <location filename="../../register/rows.py" />
+            <source>Part</source>
+            <translation>Teil</translation>
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <source>Quantity</source>
+            <translation>Menge</translation>
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <source>Mass of one</source>
+            <translation>Masse je Stück</translation>
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <source>Mass</source>
+            <translation>Masse</translation>
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <source>Volume of one, cm³</source>
+            <translation>Volumen je Stück, cm³</translation>
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <source>Material</source>
+            <translation>Werkstoff</translation>
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <location filename="../../register/dialog.py" />
+            <source>Remarks</source>
+            <translation>Bemerkungen</translation>
         </message>
         <message>
             <location filename="../../mass/flow.py" />
@@ -652,78 +704,6 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
             <location filename="../../mass/flow.py" />
             <source>This FreeCAD's Python has no numpy, which masses need.</source>
             <translation>Dem Python dieses FreeCAD fehlt numpy, das für Massen nötig ist.</translation>
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <source>Measuring {name}</source>
-            <translation>{name} wird gemessen</translation>
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <source>Reading the assembly…</source>
-            <translation>Baugruppe wird gelesen…</translation>
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <source>Part {n} of {total}</source>
-            <translation>Teil {n} von {total}</translation>
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <source>face {n} of {total}</source>
-            <translation>Fläche {n} von {total}</translation>
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <source>Mass of {name}</source>
-            <translation>Masse von {name}</translation>
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <source>Copy the table, for a spreadsheet</source>
-            <translation>Die Tabelle kopieren, für eine Tabellenkalkulation</translation>
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <source>Copy</source>
-            <translation>Kopieren</translation>
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <location filename="../../register/flow.py" />
-            <source>Part</source>
-            <translation>Teil</translation>
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <source>Quantity</source>
-            <translation>Menge</translation>
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <source>Mass of one</source>
-            <translation>Masse je Stück</translation>
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <source>Mass</source>
-            <translation>Masse</translation>
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <source>Volume of one, cm³</source>
-            <translation>Volumen je Stück, cm³</translation>
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <source>Material</source>
-            <translation>Werkstoff</translation>
-        </message>
-        <message>
-            <location filename="../../mass/flow.py" />
-            <location filename="../../register/dialog.py" />
-            <source>Remarks</source>
-            <translation>Bemerkungen</translation>
         </message>
         <message>
             <location filename="../../mass/rows.py" />
@@ -761,6 +741,26 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
             <translation>kein Werkstoff mit Dichte</translation>
         </message>
         <message>
+            <location filename="../../mass/waiting.py" />
+            <source>Measuring {name}</source>
+            <translation>{name} wird gemessen</translation>
+        </message>
+        <message>
+            <location filename="../../mass/waiting.py" />
+            <source>Reading the assembly…</source>
+            <translation>Baugruppe wird gelesen…</translation>
+        </message>
+        <message>
+            <location filename="../../mass/waiting.py" />
+            <source>Part {n} of {total}</source>
+            <translation>Teil {n} von {total}</translation>
+        </message>
+        <message>
+            <location filename="../../mass/waiting.py" />
+            <source>face {n} of {total}</source>
+            <translation>Fläche {n} von {total}</translation>
+        </message>
+        <message>
             <location filename="../../packages.py" />
             <source>Silo needs the Python packages {names}. Install them with silo-mod install-addon, or with: {command} – then start FreeCAD again.</source>
             <translation>Silo braucht die Python-Pakete {names}. Installieren Sie sie mit silo-mod install-addon oder mit: {command} – und starten Sie FreeCAD neu.</translation>
@@ -784,13 +784,13 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../pane/banner.py" />
-            <location filename="../../settings/page.py" />
+            <location filename="../../settings/install.py" />
             <source>Try again</source>
             <translation>Noch einmal versuchen</translation>
         </message>
         <message>
             <location filename="../../pane/banner.py" />
-            <location filename="../../settings/page.py" />
+            <location filename="../../settings/install.py" />
             <source>Install What Silo Needs…</source>
             <translation>Installieren, was Silo braucht…</translation>
         </message>
@@ -871,7 +871,7 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../pane/dock.py" />
-            <location filename="../../settings/page.py" />
+            <location filename="../../settings/install.py" />
             <source>Database Activity</source>
             <translation>Datenbank-Aktivität</translation>
         </message>
@@ -966,7 +966,7 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../preview/dialog.py" />
-            <location filename="../../register/flow.py" />
+            <location filename="../../register/rows.py" />
             <source>Assembly</source>
             <translation>Baugruppe</translation>
         </message>
@@ -1063,131 +1063,6 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../preview/flow.py" />
-            <source>Without a part number: left out until registered</source>
-            <translation>Ohne Teilenummer: fehlt bis zur Registrierung</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>Not counted, or counted with a remark</source>
-            <translation>Nicht gezählt, oder mit einer Bemerkung gezählt</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>missing: {file}</source>
-            <translation>fehlt: {file}</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>… more rows than can be shown here</source>
-            <translation>… mehr Zeilen, als hier gezeigt werden können</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>new in the assembly: will be added</source>
-            <translation>neu in der Baugruppe: kommt hinzu</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>will take the assembly's quantity</source>
-            <translation>erhält die Menge der Baugruppe</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>manual line in Silo with another quantity: a person decides there</source>
-            <translation>manuelle Position in Silo mit anderer Menge: dort entscheidet ein Mensch</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>not in the assembly: kept, marked unreferenced</source>
-            <translation>nicht in der Baugruppe: bleibt, als nicht verwendet markiert</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>manual line: not touched</source>
-            <translation>manuelle Position: bleibt unberührt</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>its file is missing: the line stays as it is</source>
-            <translation>ihre Datei fehlt: die Position bleibt, wie sie ist</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>its own BOM is not in Silo yet</source>
-            <translation>ihre eigene Stückliste ist noch nicht in Silo</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>its own BOM differs from Silo</source>
-            <translation>ihre eigene Stückliste weicht von Silo ab</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>{n} to add</source>
-            <translation>{n} neu</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>{n} with another quantity</source>
-            <translation>{n} mit anderer Menge</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>{n} unreferenced</source>
-            <translation>{n} nicht verwendet</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>{n} in conflict</source>
-            <translation>{n} im Konflikt</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>{n} without a part number</source>
-            <translation>{n} ohne Teilenummer</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>{n} missing</source>
-            <translation>{n} fehlend</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>{n} sub-assembly is not in Silo yet</source>
-            <translation>{n} Unterbaugruppe ist noch nicht in Silo</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>{n} sub-assemblies are not in Silo yet</source>
-            <translation>{n} Unterbaugruppen sind noch nicht in Silo</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>{n} sub-assembly differs from Silo</source>
-            <translation>{n} Unterbaugruppe weicht von Silo ab</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>{n} sub-assemblies differ from Silo</source>
-            <translation>{n} Unterbaugruppen weichen von Silo ab</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>{n} line agrees</source>
-            <translation>{n} Position stimmt überein</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>{n} lines agree</source>
-            <translation>{n} Positionen stimmen überein</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>Nothing to sync: all {n} lines agree with Silo.</source>
-            <translation>Nichts abzugleichen: Alle {n} Positionen stimmen mit Silo überein.</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
             <source>{name} holds no assembly, so it has no BOM.</source>
             <translation>{name} enthält keine Baugruppe, also keine Stückliste.</translation>
         </message>
@@ -1211,6 +1086,131 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
             <location filename="../../preview/flow.py" />
             <source>Nothing was synced: {name} was edited since the comparison. Here it is now.</source>
             <translation>Nichts wurde abgeglichen: {name} wurde seit dem Vergleich geändert. So ist der Stand jetzt.</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>Without a part number: left out until registered</source>
+            <translation>Ohne Teilenummer: fehlt bis zur Registrierung</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>Not counted, or counted with a remark</source>
+            <translation>Nicht gezählt, oder mit einer Bemerkung gezählt</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>missing: {file}</source>
+            <translation>fehlt: {file}</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>… more rows than can be shown here</source>
+            <translation>… mehr Zeilen, als hier gezeigt werden können</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>new in the assembly: will be added</source>
+            <translation>neu in der Baugruppe: kommt hinzu</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>will take the assembly's quantity</source>
+            <translation>erhält die Menge der Baugruppe</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>manual line in Silo with another quantity: a person decides there</source>
+            <translation>manuelle Position in Silo mit anderer Menge: dort entscheidet ein Mensch</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>not in the assembly: kept, marked unreferenced</source>
+            <translation>nicht in der Baugruppe: bleibt, als nicht verwendet markiert</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>manual line: not touched</source>
+            <translation>manuelle Position: bleibt unberührt</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>its file is missing: the line stays as it is</source>
+            <translation>ihre Datei fehlt: die Position bleibt, wie sie ist</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>its own BOM is not in Silo yet</source>
+            <translation>ihre eigene Stückliste ist noch nicht in Silo</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>its own BOM differs from Silo</source>
+            <translation>ihre eigene Stückliste weicht von Silo ab</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} to add</source>
+            <translation>{n} neu</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} with another quantity</source>
+            <translation>{n} mit anderer Menge</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} unreferenced</source>
+            <translation>{n} nicht verwendet</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} in conflict</source>
+            <translation>{n} im Konflikt</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} without a part number</source>
+            <translation>{n} ohne Teilenummer</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} missing</source>
+            <translation>{n} fehlend</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} sub-assembly is not in Silo yet</source>
+            <translation>{n} Unterbaugruppe ist noch nicht in Silo</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} sub-assemblies are not in Silo yet</source>
+            <translation>{n} Unterbaugruppen sind noch nicht in Silo</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} sub-assembly differs from Silo</source>
+            <translation>{n} Unterbaugruppe weicht von Silo ab</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} sub-assemblies differ from Silo</source>
+            <translation>{n} Unterbaugruppen weichen von Silo ab</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} line agrees</source>
+            <translation>{n} Position stimmt überein</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} lines agree</source>
+            <translation>{n} Positionen stimmen überein</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>Nothing to sync: all {n} lines agree with Silo.</source>
+            <translation>Nichts abzugleichen: Alle {n} Positionen stimmen mit Silo überein.</translation>
         </message>
         <message>
             <location filename="../../register/dialog.py" />
@@ -1380,286 +1380,6 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../register/flow.py" />
-            <source>Components</source>
-            <translation>Komponenten</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>Standard parts</source>
-            <translation>Normteile</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>Modelled in this file, not counted</source>
-            <translation>In dieser Datei modelliert, nicht gezählt</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>Modelled in this file, and counted</source>
-            <translation>In dieser Datei modelliert und gezählt</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>Modelled in this file, not a part</source>
-            <translation>In dieser Datei modelliert und kein Teil</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>Consumable</source>
-            <translation>Verbrauchsmaterial</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>Tool</source>
-            <translation>Werkzeug</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>made here</source>
-            <translation>selbst gefertigt</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>bought</source>
-            <translation>gekauft</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>not stated</source>
-            <translation>offen</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>all rows</source>
-            <translation>alle Zeilen</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>unsure</source>
-            <translation>unsichere</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>new</source>
-            <translation>neue</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>probable duplicates</source>
-            <translation>mögliche Dubletten</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>its unsaved edits are saved too</source>
-            <translation>ungespeicherte Änderungen werden mit gespeichert</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>open in another FreeCAD: close it there first, or saving there undoes this</source>
-            <translation>in einem anderen FreeCAD offen: zuerst dort schließen, sonst macht Speichern dort dies rückgängig</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>the file is read-only</source>
-            <translation>die Datei ist schreibgeschützt</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>has edits, but is loaded only in part: open the file itself first</source>
-            <translation>hat Änderungen, ist aber nur teilweise geladen: zuerst die Datei selbst öffnen</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>has changed on disk since you opened it: open it again first</source>
-            <translation>wurde auf der Platte geändert, seit Sie geöffnet haben: zuerst neu öffnen</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>the file is missing</source>
-            <translation>die Datei fehlt</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>has no file yet: save it first</source>
-            <translation>hat noch keine Datei: zuerst speichern</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>made by a newer FreeCAD: cannot be saved here</source>
-            <translation>von einem neueren FreeCAD: kann hier nicht gespeichert werden</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>Standard part: {name}</source>
-            <translation>Normteil: {name}</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>{name} ({n} copies)</source>
-            <translation>{name} ({n} Kopien)</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>{number} (kept)</source>
-            <translation>{number} (bleibt)</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>same or new part?</source>
-            <translation>gleiches oder neues Teil?</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>one for each</source>
-            <translation>je eine</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>{number} or later</source>
-            <translation>{number} oder höher</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>{number} (new)</source>
-            <translation>{number} (neu)</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>same part: keep {number}</source>
-            <translation>gleiches Teil: {number} behalten</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>new part: a new number</source>
-            <translation>neues Teil: neue Nummer</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>a new number</source>
-            <translation>eine neue Nummer</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>different parts: a number for each copy</source>
-            <translation>verschiedene Teile: eine Nummer je Kopie</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>stays as it is</source>
-            <translation>bleibt, wie es ist</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>registered</source>
-            <translation>registriert</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>registering…</source>
-            <translation>wird registriert…</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>as you chose in this folder before</source>
-            <translation>wie zuvor von Ihnen in diesem Ordner gewählt</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>not a part: not listed again</source>
-            <translation>kein Teil: nichts fragt mehr danach</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>counts once</source>
-            <translation>zählt einmal</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>counts {n} times</source>
-            <translation>zählt {n}-mal</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>would count once; check it if it is a part</source>
-            <translation>würde einmal zählen; anhaken, wenn es ein Teil ist</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>would count {n} times; check it if it is a part</source>
-            <translation>würde {n}-mal zählen; anhaken, wenn es ein Teil ist</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>imported from {file}</source>
-            <translation>importiert aus {file}</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>equal by their labels only</source>
-            <translation>gleich nur nach den Bezeichnungen</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>carries the identity of {number}, as another file does</source>
-            <translation>trägt die Identität von {number}, wie eine andere Datei</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>registered at another server: it keeps its identity</source>
-            <translation>auf einem anderen Server registriert: behält seine Identität</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>the same content as {name}</source>
-            <translation>gleicher Inhalt wie {name}</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>Silo has this very file as {number}</source>
-            <translation>Silo hat genau diese Datei als {number}</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>Silo has {number} with the same name</source>
-            <translation>Silo hat {number} mit gleichem Namen</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>Silo was not searched for parts that look alike: {problem}</source>
-            <translation>In Silo wurde nicht nach ähnlichen Teilen gesucht: {problem}</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>All components of {name} have their Silo part number.</source>
-            <translation>Alle Komponenten von {name} haben ihre Silo-Teilenummer.</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>All of these have their part number now.</source>
-            <translation>Alle diese haben nun ihre Teilenummer.</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>Where files carry one identity, choose in the column Part number: the same part, or a new one?</source>
-            <translation>Tragen Dateien dieselbe Identität, wählen Sie in der Spalte Teilenummer: das gleiche Teil oder ein neues?</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>({n} more after these)</source>
-            <translation>({n} weitere danach)</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>The following component has no Silo part number and will be excluded from the BOM until registered:</source>
-            <translation>Die folgende Komponente hat keine Silo-Teilenummer und fehlt in der Stückliste, bis sie registriert ist:</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
-            <source>The following components have no Silo part number and will be excluded from the BOM until registered:</source>
-            <translation>Die folgenden Komponenten haben keine Silo-Teilenummer und fehlen in der Stückliste, bis sie registriert sind:</translation>
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
             <source>Looking for components without a part number</source>
             <translation>Komponenten ohne Teilenummer werden gesucht</translation>
         </message>
@@ -1687,6 +1407,286 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
             <location filename="../../register/flow.py" />
             <source>Registered</source>
             <translation>Registriert</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Components</source>
+            <translation>Komponenten</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Standard parts</source>
+            <translation>Normteile</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Modelled in this file, not counted</source>
+            <translation>In dieser Datei modelliert, nicht gezählt</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Modelled in this file, and counted</source>
+            <translation>In dieser Datei modelliert und gezählt</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Modelled in this file, not a part</source>
+            <translation>In dieser Datei modelliert und kein Teil</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Consumable</source>
+            <translation>Verbrauchsmaterial</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Tool</source>
+            <translation>Werkzeug</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>made here</source>
+            <translation>selbst gefertigt</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>bought</source>
+            <translation>gekauft</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>not stated</source>
+            <translation>offen</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>all rows</source>
+            <translation>alle Zeilen</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>unsure</source>
+            <translation>unsichere</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>new</source>
+            <translation>neue</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>probable duplicates</source>
+            <translation>mögliche Dubletten</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>its unsaved edits are saved too</source>
+            <translation>ungespeicherte Änderungen werden mit gespeichert</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>open in another FreeCAD: close it there first, or saving there undoes this</source>
+            <translation>in einem anderen FreeCAD offen: zuerst dort schließen, sonst macht Speichern dort dies rückgängig</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>the file is read-only</source>
+            <translation>die Datei ist schreibgeschützt</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>has edits, but is loaded only in part: open the file itself first</source>
+            <translation>hat Änderungen, ist aber nur teilweise geladen: zuerst die Datei selbst öffnen</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>has changed on disk since you opened it: open it again first</source>
+            <translation>wurde auf der Platte geändert, seit Sie geöffnet haben: zuerst neu öffnen</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>the file is missing</source>
+            <translation>die Datei fehlt</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>has no file yet: save it first</source>
+            <translation>hat noch keine Datei: zuerst speichern</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>made by a newer FreeCAD: cannot be saved here</source>
+            <translation>von einem neueren FreeCAD: kann hier nicht gespeichert werden</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Standard part: {name}</source>
+            <translation>Normteil: {name}</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>{name} ({n} copies)</source>
+            <translation>{name} ({n} Kopien)</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>{number} (kept)</source>
+            <translation>{number} (bleibt)</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>same or new part?</source>
+            <translation>gleiches oder neues Teil?</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>one for each</source>
+            <translation>je eine</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>{number} or later</source>
+            <translation>{number} oder höher</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>{number} (new)</source>
+            <translation>{number} (neu)</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>same part: keep {number}</source>
+            <translation>gleiches Teil: {number} behalten</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>new part: a new number</source>
+            <translation>neues Teil: neue Nummer</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>a new number</source>
+            <translation>eine neue Nummer</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>different parts: a number for each copy</source>
+            <translation>verschiedene Teile: eine Nummer je Kopie</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>stays as it is</source>
+            <translation>bleibt, wie es ist</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>registered</source>
+            <translation>registriert</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>registering…</source>
+            <translation>wird registriert…</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>as you chose in this folder before</source>
+            <translation>wie zuvor von Ihnen in diesem Ordner gewählt</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>not a part: not listed again</source>
+            <translation>kein Teil: nichts fragt mehr danach</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>counts once</source>
+            <translation>zählt einmal</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>counts {n} times</source>
+            <translation>zählt {n}-mal</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>would count once; check it if it is a part</source>
+            <translation>würde einmal zählen; anhaken, wenn es ein Teil ist</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>would count {n} times; check it if it is a part</source>
+            <translation>würde {n}-mal zählen; anhaken, wenn es ein Teil ist</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>imported from {file}</source>
+            <translation>importiert aus {file}</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>equal by their labels only</source>
+            <translation>gleich nur nach den Bezeichnungen</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>carries the identity of {number}, as another file does</source>
+            <translation>trägt die Identität von {number}, wie eine andere Datei</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>registered at another server: it keeps its identity</source>
+            <translation>auf einem anderen Server registriert: behält seine Identität</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>the same content as {name}</source>
+            <translation>gleicher Inhalt wie {name}</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Silo has this very file as {number}</source>
+            <translation>Silo hat genau diese Datei als {number}</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Silo has {number} with the same name</source>
+            <translation>Silo hat {number} mit gleichem Namen</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Silo was not searched for parts that look alike: {problem}</source>
+            <translation>In Silo wurde nicht nach ähnlichen Teilen gesucht: {problem}</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>All components of {name} have their Silo part number.</source>
+            <translation>Alle Komponenten von {name} haben ihre Silo-Teilenummer.</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>All of these have their part number now.</source>
+            <translation>Alle diese haben nun ihre Teilenummer.</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Where files carry one identity, choose in the column Part number: the same part, or a new one?</source>
+            <translation>Tragen Dateien dieselbe Identität, wählen Sie in der Spalte Teilenummer: das gleiche Teil oder ein neues?</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>({n} more after these)</source>
+            <translation>({n} weitere danach)</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>The following component has no Silo part number and will be excluded from the BOM until registered:</source>
+            <translation>Die folgende Komponente hat keine Silo-Teilenummer und fehlt in der Stückliste, bis sie registriert ist:</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>The following components have no Silo part number and will be excluded from the BOM until registered:</source>
+            <translation>Die folgenden Komponenten haben keine Silo-Teilenummer und fehlen in der Stückliste, bis sie registriert sind:</translation>
         </message>
         <message>
             <location filename="../../revisions/dialog.py" />
@@ -1895,21 +1895,6 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../revisions/flow.py" />
-            <source>The ghost is removed.</source>
-            <translation>Der Schatten ist entfernt.</translation>
-        </message>
-        <message>
-            <location filename="../../revisions/flow.py" />
-            <source>Ghost: {removed} only in revision {n}, {moved} elsewhere there. Only here: {added}.</source>
-            <translation>Schatten: {removed} nur in Revision {n}, {moved} dort an anderer Stelle. Nur hier: {added}.</translation>
-        </message>
-        <message>
-            <location filename="../../revisions/flow.py" />
-            <source>Not compared: {unknown} in groups and arrays without links.</source>
-            <translation>Nicht verglichen: {unknown} in Gruppen und Anordnungen ohne Verknüpfungen.</translation>
-        </message>
-        <message>
-            <location filename="../../revisions/flow.py" />
             <source>Silo has no model of revision {n} yet.</source>
             <translation>Silo hat noch kein Modell von Revision {n}.</translation>
         </message>
@@ -1964,92 +1949,107 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
             <translation>Revisionen werden verglichen</translation>
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/ghosts.py" />
+            <source>The ghost is removed.</source>
+            <translation>Der Schatten ist entfernt.</translation>
+        </message>
+        <message>
+            <location filename="../../revisions/ghosts.py" />
+            <source>Ghost: {removed} only in revision {n}, {moved} elsewhere there. Only here: {added}.</source>
+            <translation>Schatten: {removed} nur in Revision {n}, {moved} dort an anderer Stelle. Nur hier: {added}.</translation>
+        </message>
+        <message>
+            <location filename="../../revisions/ghosts.py" />
+            <source>Not compared: {unknown} in groups and arrays without links.</source>
+            <translation>Nicht verglichen: {unknown} in Gruppen und Anordnungen ohne Verknüpfungen.</translation>
+        </message>
+        <message>
+            <location filename="../../revisions/project.py" />
             <source>not in Silo</source>
             <translation>nicht in Silo</translation>
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>edited since its commit</source>
             <translation>seit dem Einchecken geändert</translation>
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>newer in Silo</source>
             <translation>neuer in Silo</translation>
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>edited, and newer in Silo</source>
             <translation>geändert, und neuer in Silo</translation>
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>waits to be sent</source>
             <translation>wartet auf das Senden</translation>
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>its item is not on this server</source>
             <translation>sein Artikel ist nicht auf diesem Server</translation>
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>unsaved edits</source>
             <translation>ungespeicherte Änderungen</translation>
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>was {place}</source>
             <translation>war {place}</translation>
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>{n} files, {left} of them different from Silo</source>
             <translation>{n} Dateien, {left} davon nicht wie hier in Silo</translation>
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>Looking at the project</source>
             <translation>Projekt wird geprüft</translation>
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>{place} links to {name}, which is not there.</source>
             <translation>{place} verweist auf {name}; die Datei fehlt.</translation>
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>{place} links to {name}, outside the project: it is not sent.</source>
             <translation>{place} verweist auf {name} außerhalb des Projekts: wird nicht gesendet.</translation>
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>{place} cannot be read: {name}</source>
             <translation>{place} kann nicht gelesen werden: {name}</translation>
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>{place} is a copy of {name}, which has the item.</source>
             <translation>{place} ist eine Kopie von {name}, zu der der Artikel gehört.</translation>
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/project.py" />
             <source>{place} is gone since its commit.</source>
             <translation>{place} ist seit dem Einchecken verschwunden.</translation>
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/pulled.py" />
             <source>{name} has edits that are not in Silo; it was left alone.</source>
             <translation>{name} hat Änderungen, die nicht in Silo sind; die Datei blieb unberührt.</translation>
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/pulled.py" />
             <source>{name} is open in FreeCAD; it was left alone.</source>
             <translation>{name} ist in FreeCAD offen; die Datei blieb unberührt.</translation>
         </message>
         <message>
-            <location filename="../../revisions/flow.py" />
+            <location filename="../../revisions/pulled.py" />
             <source>{path}, which {name} links to, was not fetched: {reason}</source>
             <translation>{path}, worauf {name} verweist, wurde nicht geholt: {reason}</translation>
         </message>
@@ -2092,6 +2092,128 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
             <location filename="../../session/session.py" />
             <source>Outbox</source>
             <translation>Postausgang</translation>
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>Enter the server's address too: a token belongs to its server.</source>
+            <translation>Geben Sie auch die Adresse des Servers an: Ein Token gehört zu seinem Server.</translation>
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>Enter the address of the server first.</source>
+            <translation>Geben Sie zuerst die Adresse des Servers an.</translation>
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>Connected as {user} ({role}); the server is in {mode} mode.</source>
+            <translation>Verbunden als {user} ({role}); der Server ist im Modus {mode}.</translation>
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>This server has no page for a login. Make a token on its account page.</source>
+            <translation>Dieser Server hat keine Seite dafür. Erstellen Sie ein Token auf seiner Kontoseite.</translation>
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>No server is set up. To try it out, run: silo-mod serve</source>
+            <translation>Kein Server ist eingerichtet. Zum Ausprobieren: silo-mod serve</translation>
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>from the environment variable SILO_API_URL</source>
+            <translation>aus der Umgebungsvariablen SILO_API_URL</translation>
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>from this page</source>
+            <translation>von dieser Seite</translation>
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>from the configuration file of silo-mod</source>
+            <translation>aus der Konfigurationsdatei von silo-mod</translation>
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>Token: from the environment variable SILO_API_TOKEN.</source>
+            <translation>Token: aus der Umgebungsvariablen SILO_API_TOKEN.</translation>
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>Token: from the system's keyring.</source>
+            <translation>Token: aus dem Schlüsselbund des Systems.</translation>
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>Token: from FreeCAD's preferences, a plain file.</source>
+            <translation>Token: aus FreeCADs Einstellungen, einer lesbaren Datei.</translation>
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>Token: from the configuration file of silo-mod.</source>
+            <translation>Token: aus der Konfigurationsdatei von silo-mod.</translation>
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>Token: none.</source>
+            <translation>Token: keines.</translation>
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>In use: {url} ({from}).</source>
+            <translation>In Gebrauch: {url} ({from}).</translation>
+        </message>
+        <message>
+            <location filename="../../settings/connection_test.py" />
+            <source>SILO_SSL_VERIFY decides about the certificate.</source>
+            <translation>SILO_SSL_VERIFY entscheidet über das Zertifikat.</translation>
+        </message>
+        <message>
+            <location filename="../../settings/help.py" />
+            <source>Help on Silo</source>
+            <translation>Hilfe zu Silo</translation>
+        </message>
+        <message>
+            <location filename="../../settings/help.py" />
+            <source>The documentation is not there: {path}</source>
+            <translation>Die Dokumentation fehlt: {path}</translation>
+        </message>
+        <message>
+            <location filename="../../settings/install.py" />
+            <source>Silo cannot start yet: FreeCAD's Python lacks {names}.</source>
+            <translation>Silo kann noch nicht starten: FreeCADs Python fehlt {names}.</translation>
+        </message>
+        <message>
+            <location filename="../../settings/install.py" />
+            <source>Install what Silo needs</source>
+            <translation>Installieren, was Silo braucht</translation>
+        </message>
+        <message>
+            <location filename="../../settings/install.py" />
+            <source>Silo needs these Python packages: {names}.
+They are installed in {folder}.</source>
+            <translation>Silo braucht diese Python-Pakete: {names}.
+Sie werden in {folder} installiert.</translation>
+        </message>
+        <message>
+            <location filename="../../settings/install.py" />
+            <source>Install</source>
+            <translation>Installieren</translation>
+        </message>
+        <message>
+            <location filename="../../settings/install.py" />
+            <source>Installing. This takes a minute or two…</source>
+            <translation>Wird installiert. Das dauert ein bis zwei Minuten…</translation>
+        </message>
+        <message>
+            <location filename="../../settings/install.py" />
+            <source>The packages are in {folder}. Start FreeCAD again to use Silo.</source>
+            <translation>Die Pakete sind in {folder}. Starten Sie FreeCAD neu, um Silo zu benutzen.</translation>
+        </message>
+        <message>
+            <location filename="../../settings/install.py" />
+            <source>They could not be installed: {reason}</source>
+            <translation>Sie konnten nicht installiert werden: {reason}</translation>
         </message>
         <message>
             <location filename="../../settings/page.py" />
@@ -2254,128 +2376,6 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
             <translation>Anmeldeseite wird erfragt</translation>
         </message>
         <message>
-            <location filename="../../settings/page.py" />
-            <source>Help on Silo</source>
-            <translation>Hilfe zu Silo</translation>
-        </message>
-        <message>
-            <location filename="../../settings/page.py" />
-            <source>The documentation is not there: {path}</source>
-            <translation>Die Dokumentation fehlt: {path}</translation>
-        </message>
-        <message>
-            <location filename="../../settings/page.py" />
-            <source>Silo cannot start yet: FreeCAD's Python lacks {names}.</source>
-            <translation>Silo kann noch nicht starten: FreeCADs Python fehlt {names}.</translation>
-        </message>
-        <message>
-            <location filename="../../settings/page.py" />
-            <source>Install what Silo needs</source>
-            <translation>Installieren, was Silo braucht</translation>
-        </message>
-        <message>
-            <location filename="../../settings/page.py" />
-            <source>Silo needs these Python packages: {names}.
-They are installed in {folder}.</source>
-            <translation>Silo braucht diese Python-Pakete: {names}.
-Sie werden in {folder} installiert.</translation>
-        </message>
-        <message>
-            <location filename="../../settings/page.py" />
-            <source>Install</source>
-            <translation>Installieren</translation>
-        </message>
-        <message>
-            <location filename="../../settings/page.py" />
-            <source>Installing. This takes a minute or two…</source>
-            <translation>Wird installiert. Das dauert ein bis zwei Minuten…</translation>
-        </message>
-        <message>
-            <location filename="../../settings/page.py" />
-            <source>The packages are in {folder}. Start FreeCAD again to use Silo.</source>
-            <translation>Die Pakete sind in {folder}. Starten Sie FreeCAD neu, um Silo zu benutzen.</translation>
-        </message>
-        <message>
-            <location filename="../../settings/page.py" />
-            <source>They could not be installed: {reason}</source>
-            <translation>Sie konnten nicht installiert werden: {reason}</translation>
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>Enter the server's address too: a token belongs to its server.</source>
-            <translation>Geben Sie auch die Adresse des Servers an: Ein Token gehört zu seinem Server.</translation>
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>Enter the address of the server first.</source>
-            <translation>Geben Sie zuerst die Adresse des Servers an.</translation>
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>Connected as {user} ({role}); the server is in {mode} mode.</source>
-            <translation>Verbunden als {user} ({role}); der Server ist im Modus {mode}.</translation>
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>This server has no page for a login. Make a token on its account page.</source>
-            <translation>Dieser Server hat keine Seite dafür. Erstellen Sie ein Token auf seiner Kontoseite.</translation>
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>No server is set up. To try it out, run: silo-mod serve</source>
-            <translation>Kein Server ist eingerichtet. Zum Ausprobieren: silo-mod serve</translation>
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>from the environment variable SILO_API_URL</source>
-            <translation>aus der Umgebungsvariablen SILO_API_URL</translation>
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>from this page</source>
-            <translation>von dieser Seite</translation>
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>from the configuration file of silo-mod</source>
-            <translation>aus der Konfigurationsdatei von silo-mod</translation>
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>Token: from the environment variable SILO_API_TOKEN.</source>
-            <translation>Token: aus der Umgebungsvariablen SILO_API_TOKEN.</translation>
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>Token: from the system's keyring.</source>
-            <translation>Token: aus dem Schlüsselbund des Systems.</translation>
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>Token: from FreeCAD's preferences, a plain file.</source>
-            <translation>Token: aus FreeCADs Einstellungen, einer lesbaren Datei.</translation>
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>Token: from the configuration file of silo-mod.</source>
-            <translation>Token: aus der Konfigurationsdatei von silo-mod.</translation>
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>Token: none.</source>
-            <translation>Token: keines.</translation>
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>In use: {url} ({from}).</source>
-            <translation>In Gebrauch: {url} ({from}).</translation>
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>SILO_SSL_VERIFY decides about the certificate.</source>
-            <translation>SILO_SSL_VERIFY entscheidet über das Zertifikat.</translation>
-        </message>
-        <message>
             <location filename="../../start.py" />
             <source>Silo is installed more than once: {folders}. Only {used} is used; remove the others.</source>
             <translation>Silo ist mehrfach installiert: {folders}. Nur {used} wird benutzt; entfernen Sie die anderen.</translation>
@@ -2446,77 +2446,77 @@ Sie werden in {folder} installiert.</translation>
             <translation>Die Kategorieregeln dieses Silo gelten nicht, bis sie berichtigt sind: {problem}</translation>
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>It is meant for {there}, which is not the server in use.</source>
             <translation>Gemeint ist {there}, nicht der verwendete Server.</translation>
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>for another server</source>
             <translation>für einen anderen Server</translation>
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>out of date</source>
             <translation>überholt</translation>
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>A newer commit of it has arrived since; this one would undo it.</source>
             <translation>Neueres Eingechecktes ist inzwischen angekommen; dies würde es rückgängig machen.</translation>
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>held for your choice</source>
             <translation>wartet auf Ihre Entscheidung</translation>
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>being copied</source>
             <translation>wird kopiert</translation>
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>Its file is being copied.</source>
             <translation>Die Datei wird gerade kopiert.</translation>
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>paused</source>
             <translation>angehalten</translation>
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>tried again later</source>
             <translation>wird später wieder versucht</translation>
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>waiting</source>
             <translation>wartet</translation>
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>file and BOM</source>
             <translation>Datei und Stückliste</translation>
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>BOM</source>
             <translation>Stückliste</translation>
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>file</source>
             <translation>Datei</translation>
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>Nothing is sent to {host} before you retry: {reason}</source>
             <translation>Bis Sie es wiederholen, wird nichts an {host} gesendet: {reason}</translation>
         </message>
         <message>
-            <location filename="../../../outbox/entry.py" />
+            <location filename="../../../outbox/status_text.py" />
             <source>Nothing is sent to {host} for {time}: {reason}</source>
             <translation>Für {time} wird nichts an {host} gesendet: {reason}</translation>
         </message>
@@ -2659,12 +2659,12 @@ Sie werden in {folder} installiert.</translation>
     <context>
         <name>Silo_InstallPackages</name>
         <message>
-            <location filename="../../settings/page.py" />
+            <location filename="../../settings/install.py" />
             <source>Install What Silo Needs…</source>
             <translation>Installieren, was Silo braucht…</translation>
         </message>
         <message>
-            <location filename="../../settings/page.py" />
+            <location filename="../../settings/install.py" />
             <source>Install the Python packages that Silo needs</source>
             <translation>Die Python-Pakete installieren, die Silo braucht</translation>
         </message>
