@@ -37,6 +37,7 @@ from silo_server.services.bom.line_edit import add_line, change_line, remove_lin
 from silo_server.services.bom.lines import lines_of
 from silo_server.services.bom.merge import merge_bom, preview_merge
 from silo_server.services.bom.merge_request import read_merge_request
+from silo_server.services.bom.restore import restore_bom, undo_change
 from silo_server.services.bom.review import open_conflicts
 from silo_server.services.items import NewItem, create_item, get_item
 from silo_server.settings import Settings
@@ -207,7 +208,7 @@ class Silo(RuleBasedStateMachine):
     def restore(self, data: st.DataObject, who: str) -> None:
         """Any earlier state comes back, whole."""
         point = data.draw(st.sampled_from(sorted(self.snapshots)))
-        self.do(who, lambda tx: history.restore(tx, self.parent, point, None, None))
+        self.do(who, lambda tx: restore_bom(tx, self.parent, point, None, None))
         self.model = copy.deepcopy(self.snapshots[point])
         self.version = self._version()
         self.changed(self.model)
@@ -220,7 +221,7 @@ class Silo(RuleBasedStateMachine):
         point = data.draw(st.sampled_from(points[1:]))
         before = copy.deepcopy(self.model)
         try:
-            self.do(who, lambda tx: history.undo(tx, self.parent, point, None))
+            self.do(who, lambda tx: undo_change(tx, self.parent, point, None))
         except ConflictError:
             assert point != points[-1], "the newest change could not be undone"
             return

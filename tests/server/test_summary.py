@@ -34,6 +34,7 @@ from silo_server.services.bom.last_sync import record_refusal
 from silo_server.services.bom.line_edit import add_line, change_line
 from silo_server.services.bom.merge import merge_bom
 from silo_server.services.bom.merge_request import read_merge_request
+from silo_server.services.bom.restore import undo_change
 from silo_server.services.bom.summary import (
     LONGEST_CHANGE,
     MOST_NAMED,
@@ -138,7 +139,7 @@ def undo(tx: Tx, numbers: list[str], dice: random.Random) -> None:
     number = dice.choice(numbers[:ASSEMBLIES])
     newest = history.list_changes(tx, get_item(tx, number), 1)
     if newest:
-        history.undo(tx, number, newest[0].id, None)
+        undo_change(tx, number, newest[0].id, None)
 
 
 STEPS: list[Callable[[Tx, list[str], random.Random], None]] = [

@@ -26,9 +26,12 @@ from silo_server.routes.call import Call
 from silo_server.routes.requests import PageFrom
 from silo_server.services import revisions
 from silo_server.services.bom import history, tree
+from silo_server.services.bom.differences import compare
 from silo_server.services.bom.frozen import changes_of
+from silo_server.services.bom.restore import restore_bom
 from silo_server.services.items import get_by_uuids, get_item
 from silo_server.services.looks import last_look
+from silo_server.services.product.changes import PastChange
 from silo_server.services.releases import NUMBERED, list_releases
 from silo_server.values import Item
 from silo_server.web.accounts import Reader, Writer
@@ -242,7 +245,7 @@ def changes_page(
     Between two dates or revisions; since the person last looked (``look``); or in the last 30 days.
     """
     problem, first, last, status = "", "", "", 200
-    happenings: Sequence[history.PastChange] = ()
+    happenings: Sequence[PastChange] = ()
     models: list[list[int]] = [[], []]
     with call.server.large_reads.enter(), call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
@@ -311,7 +314,7 @@ def _compare(
         before = history.list_changes(tx, item, 1, second) if old is None else []
         first = (before[0].id if before else 0) if old is None else old
         first, second = sorted((first, second))
-        rows = history.compare(history.state_at(tx, item, first), history.state_at(tx, item, second))
+        rows = compare(history.state_at(tx, item, first), history.state_at(tx, item, second))
         at = {change.id: change.at for change in changes_listed}
         models = [revisions.files_until(tx, item, at.get(point, "")) for point in (first, second)]
         has_file = revisions.has_file(tx, item)
@@ -357,7 +360,7 @@ def restore(call: Writer, part_number: str, form: Form) -> Response:
             was = len(history.state_at(tx, item, change_id))
             expected = whole(form, "version")
             sure = bool(text(form, "with_archived"))
-            made, _lines = history.restore(
+            made, _lines = restore_bom(
                 tx, part_number, change_id, reason or None, expected, with_archived=sure
             )
     except ArchivedPartsError as error:

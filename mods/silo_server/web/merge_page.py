@@ -34,6 +34,7 @@ from silo_server.services.bom.decisions import Decision, resolve
 from silo_server.services.bom.last_sync import in_sentences, last_sync
 from silo_server.services.bom.line_state import mark_of
 from silo_server.services.bom.lines import LineId, component_of, line_of, lines_of
+from silo_server.services.bom.restore import undo_change
 from silo_server.services.bom.summary import summary_of
 from silo_server.services.items import get_item
 from silo_server.services.revisions import files_until, has_file
@@ -158,7 +159,7 @@ def undo(call: Writer, part_number: str, form: Form) -> Response:
         change_id = whole(form, "change_id")
         if change_id is None:
             raise RejectedError(_("change_id: wanted the number of a change, got none; load the page again"))
-        return _("Undone."), history.undo(tx, part_number, change_id, None)[0]
+        return _("Undone."), undo_change(tx, part_number, change_id, None)[0]
 
     return _do(call, part_number, form, work)
 

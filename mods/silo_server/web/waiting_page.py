@@ -23,6 +23,7 @@ from silo_server.services import following
 from silo_server.services.bom import assignees, history
 from silo_server.services.bom.assignees import editors
 from silo_server.services.bom.decisions import ReviewAction, decide_all, lines_for
+from silo_server.services.bom.restore import undo_change
 from silo_server.services.bom.waiting import Waiting, waiting
 from silo_server.services.following import have_seen
 from silo_server.services.scene import with_model
@@ -116,7 +117,7 @@ def undo(call: Writer, form: Form) -> Response:
 
     def work(tx: Tx, change: str) -> int:
         number = whole_number(change, 18) or 0
-        return history.undo(tx, history.item_changed_by(tx, number), number, None)[0]
+        return undo_change(tx, history.item_changed_by(tx, number), number, None)[0]
 
     changes, problems = _each(call, made, lambda change: _("change %(id)s", id=change), work)
     notice, view = _("Undone in %(boms)s.", boms=plural(len(changes), "BOM")), _view_of(form)

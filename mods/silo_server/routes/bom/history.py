@@ -20,9 +20,10 @@ from silo_server.routes.bom import bom_router
 from silo_server.routes.call import Editor, Viewer
 from silo_server.routes.models import RequestBody, Text
 from silo_server.routes.requests import ExpectedVersion, PageFrom
-from silo_server.services.bom import history
+from silo_server.services.bom import differences, history
 from silo_server.services.bom.line_state import state_to_json
 from silo_server.services.bom.line_wire import line_state_to_wire
+from silo_server.services.bom.restore import restore_bom, undo_change
 from silo_server.services.items import get_item
 from silo_server.times import stamp
 from silo_server.values import Item, LineState
@@ -109,7 +110,7 @@ def compare(
     with call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
         first, second = find_point(tx, item, from_point), find_point(tx, item, to)
-        rows = history.compare(history.state_at(tx, item, first), history.state_at(tx, item, second))
+        rows = differences.compare(history.state_at(tx, item, first), history.state_at(tx, item, second))
     return {
         "part_number": item.part_number,
         "from": first,
@@ -132,7 +133,7 @@ def compare(
 def restore(call: Editor, part_number: str, body: RestoreBody, expected: ExpectedVersion) -> Response:
     """Restore an earlier state of a BOM, as a new change."""
     with call.write() as tx:
-        change_id, version = history.restore(
+        change_id, version = restore_bom(
             tx, part_number, body.change_id, body.reason, expected, with_archived=body.with_archived
         )
         return changed_answer(change_id, version)
@@ -142,7 +143,7 @@ def restore(call: Editor, part_number: str, body: RestoreBody, expected: Expecte
 def undo(call: Editor, part_number: str, body: UndoBody, expected: ExpectedVersion) -> Response:
     """Undo one change, as a new change; 409 if its lines have changed again since."""
     with call.write() as tx:
-        change_id, version = history.undo(tx, part_number, body.change_id, expected)
+        change_id, version = undo_change(tx, part_number, body.change_id, expected)
         return changed_answer(change_id, version)
 
 

@@ -23,21 +23,20 @@ from silo.bom.quantities import plain
 from silo_server.db.rows import one_of
 from silo_server.db.tables import document_items, document_links, documents, revisions
 from silo_server.db.transaction import Tx
-from silo_server.services.bom.history import (
-    NamedItem,
-    PastChange,
-    PastLine,
-    compare,
-    data_differs,
-    in_order,
-    line_happened,
-    moment,
-    what_changed,
-)
+from silo_server.services.bom.differences import compare
+from silo_server.services.bom.history import NamedItem, PastLine
 from silo_server.services.bom.line_state import state_to_json, stored_state
 from silo_server.services.bom.summary import MassAndCost, OpenBom, Summary, summaries
 from silo_server.services.bom.tree import Graph, RolledItem, load_graph, order_of, with_supplier
 from silo_server.services.items import by_ids
+from silo_server.services.product.changes import (
+    PastChange,
+    data_differs,
+    in_order,
+    line_happened,
+    what_changed,
+)
+from silo_server.services.product.moments import moment
 from silo_server.services.releases import FrozenProduct, Release, find_release, item_of, read_records
 from silo_server.user_json import dumps
 from silo_server.values import Item, Line, bought
