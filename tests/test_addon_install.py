@@ -189,8 +189,8 @@ def test_an_archive_of_the_repository_is_small(tmp_path: Path) -> None:
         pytest.skip("not a checkout")
     command = ["git", "archive", "--format=zip", "HEAD"]
     packed = subprocess.run(command, cwd=root, capture_output=True, check=True).stdout
-    # The German of the add-on, the pages and the command line has 150 kB of it.
-    assert len(packed) <= 1_950_000
+    # A download of a moment on a slow line. A picture or a model that was added by mistake exceeds it.
+    assert len(packed) <= 3_000_000
     names = zipfile.ZipFile(io.BytesIO(packed)).namelist()
     assert {"InitGui.py", "package.xml", "mods/silo/__init__.py"} <= set(names)
     assert not [name for name in names if name.startswith(("tests/", "benchmarks/", "deploy/", "scripts/"))]
