@@ -260,12 +260,12 @@ def _texts_of_server(package: Path) -> Iterator[tuple[str, str, Path]]:
     from silo.api.wire import ItemTexts, LineTexts
     from silo_server import actors, schema
     from silo_server.services import releases, suppliers
-    from silo_server.services.bom import imports
+    from silo_server.services.bom.import_table import BOM, DELIMITERS
     from silo_server.web import render
 
     # Words that are stored, of columns and of the built-in schema; a site's own stay as they are.
     stored = [*actors.Role, *actors.Scope, *schema.ITEM_TYPES, *REL_TYPES, *releases.NUMBERED, "draft"]
-    stored += [*suppliers.COLUMNS.values(), *imports.DELIMITERS.values()]
+    stored += [*suppliers.COLUMNS.values(), *DELIMITERS.values()]
     for field in (*ItemTexts.model_fields.values(), *LineTexts.model_fields.values()):
         stored += [field.title or "", *schema.text_hints(field).get("options", ())]
     built_in = schema.find_schema(None)
@@ -273,9 +273,7 @@ def _texts_of_server(package: Path) -> Iterator[tuple[str, str, Path]]:
         stored += [one.label, one.title, one.description, *one.options]
     stored += [*built_in.domains.values(), *(category.name for category in built_in.categories.values())]
     stored += [
-        role.replace("_", " ").capitalize()
-        for table in (imports.BOM, suppliers.TABLE)
-        for role in table.roles
+        role.replace("_", " ").capitalize() for table in (BOM, suppliers.TABLE) for role in table.roles
     ]
     yield from ((str(word), "", package / "schema" / "__init__.py") for word in stored if word)
     for path in sorted(package.rglob("*.py")):

@@ -30,8 +30,8 @@ from silo_server.db.transaction import Tx
 from silo_server.db.turnstile import Turnstile
 from silo_server.errors import TooLargeError
 from silo_server.run import RunningServer, running_server
-from silo_server.services.bom import imports, tree
 from silo_server.services.bom.decisions import Decision, ReviewAction, resolve
+from silo_server.services.bom.import_table import HEADER_WITHIN, Layout, first_lines, read_csv
 from silo_server.services.bom.last_sync import record_refusal
 from silo_server.services.bom.line_edit import add_line, change_line
 from silo_server.services.bom.line_state import state_columns
@@ -40,6 +40,9 @@ from silo_server.services.bom.merge_request import read_merge_request
 from silo_server.services.bom.summary import keep_all
 from silo_server.services.bom.waiting import waiting, waiting_count
 from silo_server.services.items import NewItem, archive_item, create_item, get_item
+from silo_server.services.product.graph import load_graph
+from silo_server.services.product.tree import expand
+from silo_server.services.product.where_used import where_used
 from silo_server.settings import Settings
 from silo_server.values import LineState
 
@@ -90,10 +93,10 @@ def test_where_used_of_a_bolt_that_is_used_everywhere(db: Database) -> None:
     number = used_everywhere(db)
     with db.read() as tx:
         bolt = get_item(tx, number)
-        first, total = tree.where_used(tx, bolt, indirect=True, limit=3)
-        border, _ = tree.where_used(tx, bolt, indirect=True, limit=3, offset=PARENTS - 1)
-        direct = tree.where_used(tx, bolt, limit=1)[1]
-        past, _ = tree.where_used(tx, bolt, indirect=True, limit=3, offset=2 * PARENTS)
+        first, total = where_used(tx, bolt, indirect=True, limit=3)
+        border, _ = where_used(tx, bolt, indirect=True, limit=3, offset=PARENTS - 1)
+        direct = where_used(tx, bolt, limit=1)[1]
+        past, _ = where_used(tx, bolt, indirect=True, limit=3, offset=2 * PARENTS)
     assert (total, direct, past) == (2 * PARENTS, PARENTS, [])
     assert [(use.parent.part_number, use.depth) for use in first] == [(f"p-{n:06}", 1) for n in range(3)]
     assert [(use.parent.part_number, use.depth) for use in border] == [
@@ -113,9 +116,9 @@ def test_one_level_reads_one_level(db: Database) -> None:
             row = {"id": str(uuid.uuid4()), "parent_id": above.id, "child_id": below.id, "position": 1}
             insert_rows(tx, bom_lines, [{**row, **state}])
     with db.read() as tx:
-        read = {depth: tree.load_graph(tx, chain[0], depth) for depth in (1, 2, 4, None)}
+        read = {depth: load_graph(tx, chain[0], depth) for depth in (1, 2, 4, None)}
     assert {depth: len(graph.lines) for depth, graph in read.items()} == {1: 1, 2: 2, 4: 4, None: 5}
-    assert [row.total for row in tree.expand(read[4], 4, 100)] == [2, 4, 8, 16]
+    assert [row.total for row in expand(read[4], 4, 100)] == [2, 4, 8, 16]
 
 
 @over("sqlite")
@@ -158,18 +161,18 @@ def test_a_structure_that_would_fill_the_memory_is_not_read(url: str, tmp_path: 
 def test_a_file_that_breaks_off_shows_what_can_be_read_of_it() -> None:
     """A quote too many in one row: the person sees the header, and can say which column is which."""
     data = b'Part number,Quantity\nA,1\n"B" x,2\n'
-    assert imports.first_lines(data, ",") == [["Part number", "Quantity"], ["A", "1"]]
+    assert first_lines(data, ",") == [["Part number", "Quantity"], ["A", "1"]]
 
 
 def test_a_file_that_is_no_bom_is_not_read_to_its_end() -> None:
     """The header is looked for near the top; what stands at the end of such a file does not matter."""
     rows = b"a;b,c\td\n" * 5000
     with pytest.raises(RejectedError, match="found none"):
-        imports.read_csv(rows + b'"never closed', 20_000)
+        read_csv(rows + b'"never closed', 20_000)
     with pytest.raises(TooLargeError):
-        imports.read_csv(b"Part number,Quantity\n" + b"A,1\n" * 21 + b'"never closed', 20)
-    late = b"x\n" * (imports.HEADER_WITHIN - 1) + b"Part number,Quantity\nA,1\n"
-    assert imports.read_csv(late, 20)[0][1]["part_number"] == "A"
+        read_csv(b"Part number,Quantity\n" + b"A,1\n" * 21 + b'"never closed', 20)
+    late = b"x\n" * (HEADER_WITHIN - 1) + b"Part number,Quantity\nA,1\n"
+    assert read_csv(late, 20)[0][1]["part_number"] == "A"
 
 
 @pytest.mark.parametrize(
@@ -187,12 +190,12 @@ def test_two_columns_of_one_meaning_that_differ_are_refused(
     """Neither is taken in silence; a person's choice of columns is, and so is what says the same twice."""
     data = f"A title\n{header}\n{differ}\n".encode()
     with pytest.raises(RejectedError, match=r"both mean the .* in row 3 they say") as caught:
-        imports.read_csv(data, 20)
+        read_csv(data, 20)
     assert len(caught.value.problems) == 1
-    layout = imports.Layout(",", 1, {Heading.PART_NUMBER: 0, Heading.QUANTITY: 1})
-    assert imports.read_csv(data, 20, layout)[0][1]["part_number"] == "A"
+    layout = Layout(",", 1, {Heading.PART_NUMBER: 0, Heading.QUANTITY: 1})
+    assert read_csv(data, 20, layout)[0][1]["part_number"] == "A"
     for row in agree:
-        assert len(imports.read_csv(f"A title\n{header}\n{row}\n".encode(), 20)) == 1
+        assert len(read_csv(f"A title\n{header}\n{row}\n".encode(), 20)) == 1
 
 
 def test_a_turnstile_lets_in_so_many_and_no_more() -> None:

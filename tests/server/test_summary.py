@@ -24,11 +24,11 @@ from silo.bom.errors import BusyError, SiloError
 from silo.cli.main import main
 from silo_server.actors import Actor, Role
 from silo_server.db.database import Database
-from silo_server.db.tables import product_summaries
+from silo_server.db.tables import items, product_summaries
 from silo_server.db.transaction import Tx
 from silo_server.events import log
 from silo_server.run import prepare
-from silo_server.services.bom import history, transfer, tree
+from silo_server.services.bom import history, transfer
 from silo_server.services.bom.decisions import Decision, ReviewAction, resolve
 from silo_server.services.bom.last_sync import record_refusal
 from silo_server.services.bom.line_edit import add_line, change_line
@@ -57,6 +57,12 @@ from silo_server.services.items import (
     patch_properties,
     unarchive_item,
 )
+from silo_server.services.product import parts as product_parts
+from silo_server.services.product.flat import flatten
+from silo_server.services.product.graph import MAX_DEPTH, load_graph
+from silo_server.services.product.parts import parts_of
+from silo_server.services.product.rollup import roll_up_cost, roll_up_mass
+from silo_server.services.product.tree import expand
 from silo_server.settings import Settings
 from silo_server.values import LineState
 
@@ -159,13 +165,13 @@ def all_of(db: Database, uuids: list[str]) -> dict[str, Summary]:
 
 def check_by_rows(tx: Tx, item: Any, told: Summary) -> None:
     """Totals, counts and levels are those of the lists of all parts."""
-    graph = tree.load_graph(tx, item)
-    parts = tree.parts_of(tx, graph)
+    graph = load_graph(tx, item)
+    parts = parts_of(tx, graph)
     alone = standing_alone(tx, graph)
-    cost = tree.roll_up_cost(tree.flatten(graph), parts)
-    mass = tree.roll_up_mass(tree.flatten(graph, alone), parts, alone)
-    flat = {row.line.child_part_number for row in tree.flatten(graph)}
-    rows = list(tree.expand(graph, tree.MAX_DEPTH, 10**6))
+    cost = roll_up_cost(flatten(graph), parts)
+    mass = roll_up_mass(flatten(graph, alone), parts, alone)
+    flat = {row.line.child_part_number for row in flatten(graph)}
+    rows = list(expand(graph, MAX_DEPTH, 10**6))
     assert told.parts == len(flat)
     assert list(told.levels) == [
         sum(row.depth == level for row in rows)
@@ -197,7 +203,7 @@ def test_what_is_kept_is_what_is_counted_anew(prepared: Database, seed_of: int) 
         with suppress(SiloError), db.write(Actor(dice.choice(["ann", "bob"]), Role.EDITOR)) as tx:
             dice.choice(STEPS)(tx, numbers, dice)
         with db.read() as tx:
-            row = {str(r.uuid): str(r.part_number) for r in tx.conn.execute(tree.items.select())}
+            row = {str(r.uuid): str(r.part_number) for r in tx.conn.execute(items.select())}
         numbers = [row[uuid] for uuid in uuids]
         if dice.random() < 0.5:
             with suppress(SiloError), db.read() as tx:
@@ -384,7 +390,7 @@ def test_who_made_the_bom_what_it_is_is_named(db: Database) -> None:
 def test_a_deep_product_with_many_unknown_masses(db: Database) -> None:
     """So many levels as a tree shows, all its parts, and the first names of those without a mass."""
     with db.write() as tx:
-        depth, many = tree.MAX_DEPTH + 3, MOST_NAMED + 3
+        depth, many = MAX_DEPTH + 3, MOST_NAMED + 3
         chain = [create_item(tx, NewItem(category="A01", name="a"))[0].part_number for _ in range(depth)]
         parts = [create_item(tx, NewItem(category="F01", name="p"))[0].part_number for _ in range(many)]
         for above, below_it in itertools.pairwise(chain):
@@ -393,7 +399,7 @@ def test_a_deep_product_with_many_unknown_masses(db: Database) -> None:
     assert keep_all(db) == depth
     with db.read() as tx:
         told = summary_of(tx, get_item(tx, chain[0]))
-    assert (len(told.levels), told.parts, told.no_mass) == (tree.MAX_DEPTH, many, many)
+    assert (len(told.levels), told.parts, told.no_mass) == (MAX_DEPTH, many, many)
     assert list(told.mass_missing) == sorted(parts)[:MOST_NAMED]
 
 
@@ -426,5 +432,5 @@ def test_an_export_reads_its_parts_some_at_a_time(
         transfer.View.INDENTED: [sub, first],
         transfer.View.FLAT: [first],
     }[view]
-    monkeypatch.setattr(tree, "PORTION", 1)
+    monkeypatch.setattr(product_parts, "PORTION", 1)
     assert (rows(""), rows("misumi")) == (whole, found)

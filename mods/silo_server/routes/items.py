@@ -49,7 +49,6 @@ from silo_server.routes.requests import ExpectedVersion, idempotency_key, json_b
 from silo_server.schema import describe, describe_form, find_schema, schemas
 from silo_server.services import documents, items, revisions, scene, search
 from silo_server.services.bom.last_sync import NEVER, LastSync, last_sync, last_syncs
-from silo_server.services.bom.tree import where_used
 from silo_server.services.documents import (
     documents_by_uuid,
     documents_holding,
@@ -61,6 +60,7 @@ from silo_server.services.documents import (
 )
 from silo_server.services.drawn_picture import keep_picture
 from silo_server.services.field_checks import sha256_or_none, text_problem
+from silo_server.services.product.where_used import where_used
 from silo_server.services.releases import draft_of
 from silo_server.services.revisions import RevisionOrigin, revision_to_wire
 from silo_server.values import Document, Item, Revision

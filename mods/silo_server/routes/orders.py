@@ -26,7 +26,8 @@ from silo_server.routes.made_files import CSV, XLSX, content_of, file_of
 from silo_server.routes.models import Brief, RequestBody, Short, Text
 from silo_server.routes.requests import ExpectedVersion
 from silo_server.services import orders, suppliers
-from silo_server.services.bom import imports, transfer
+from silo_server.services.bom import transfer
+from silo_server.services.bom.import_table import Layout, Record, as_csv, guess_of, read_csv
 from silo_server.services.items import get_item
 from silo_server.services.orders import NewOrder, OrderRequest, OrderRow, Recorded
 from silo_server.services.suppliers import decimal_text
@@ -151,7 +152,7 @@ async def import_suppliers(call: Editor, dry_run: Annotated[bool, Query()] = Fal
     data, _ = await uploaded(call.request)
 
     def work() -> Response:
-        records, layout = records_of(call, imports.as_csv(data, suppliers.TABLE))
+        records, layout = records_of(call, as_csv(data, suppliers.TABLE))
         with call.read() if dry_run else call.write() as tx:
             plan = (suppliers.plan_suppliers if dry_run else suppliers.apply_suppliers)(tx, records, layout)
             rows = [
@@ -169,12 +170,10 @@ async def import_suppliers(call: Editor, dry_run: Annotated[bool, Query()] = Fal
     return await anyio.to_thread.run_sync(work)
 
 
-def records_of(
-    call: Call, table: bytes, layout: imports.Layout | None = None
-) -> tuple[list[imports.Record], imports.Layout]:
+def records_of(call: Call, table: bytes, layout: Layout | None = None) -> tuple[list[Record], Layout]:
     """Read a table of supplier parts; return its rows, and the layout that they were read with."""
-    records = imports.read_csv(table, call.server.settings.max_merge_entries, layout, suppliers.TABLE)
-    read_as = layout or imports.guess_of(table, suppliers.TABLE)
+    records = read_csv(table, call.server.settings.max_merge_entries, layout, suppliers.TABLE)
+    read_as = layout or guess_of(table, suppliers.TABLE)
     assert read_as is not None  # the rows were read with it
     return records, read_as
 

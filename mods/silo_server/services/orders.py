@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """What to order for N pieces of a product, draft or released, and what was ordered already.
 
-The parts are those of the one flat roll-up (:func:`silo_server.services.bom.tree.flatten`), where a bought
+The parts are those of the one flat list (:func:`silo_server.services.product.flat.flatten`), where a bought
 assembly counts as a part. What is open comes from the kept summary, or from the release. Bought parts
 have a supplier and a price (:mod:`silo_server.services.suppliers`), made parts a material, a mass and
 their files. Nothing is left out: what nobody called made or bought is listed as such.
@@ -27,8 +27,10 @@ from silo_server.services import audit
 from silo_server.services.bom.frozen import frozen_product
 from silo_server.services.bom.summary import Summary, own_worth, summary_of
 from silo_server.services.bom.transfer import Export, Row, View
-from silo_server.services.bom.tree import FlatRow, Graph, RolledItem, flatten, load_graph, parts_of
 from silo_server.services.items import get_item
+from silo_server.services.product.flat import FlatRow, flatten
+from silo_server.services.product.graph import Graph, load_graph
+from silo_server.services.product.parts import RolledItem, parts_of
 from silo_server.services.releases import Release, get_release, newest_release
 from silo_server.services.suppliers import (
     SupplierOffer,

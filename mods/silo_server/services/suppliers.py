@@ -34,9 +34,9 @@ from silo_server.db.transaction import Tx
 from silo_server.events import announce
 from silo_server.fields import from_row
 from silo_server.services import audit
-from silo_server.services.bom.imports import Layout, Record, Table
-from silo_server.services.bom.tree import DEFAULT_CURRENCY, RolledItem, currency_of, positive_number
+from silo_server.services.bom.import_table import Layout, Record, Table
 from silo_server.services.items import get_by_numbers, get_item
+from silo_server.services.product.parts import DEFAULT_CURRENCY, RolledItem, currency_of, positive_number
 from silo_server.services.search import index_item
 from silo_server.user_json import dumps
 from silo_server.values import Item

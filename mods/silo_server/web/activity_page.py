@@ -25,13 +25,14 @@ from silo_server.events.log import EventQuery, LoggedEvent
 from silo_server.routes.call import Call
 from silo_server.routes.requests import PageFrom
 from silo_server.services import revisions
-from silo_server.services.bom import history, tree
+from silo_server.services.bom import history
 from silo_server.services.bom.differences import compare
 from silo_server.services.bom.frozen import changes_of
 from silo_server.services.bom.restore import restore_bom
 from silo_server.services.items import get_by_uuids, get_item
 from silo_server.services.looks import last_look
 from silo_server.services.product.changes import PastChange
+from silo_server.services.product.graph import ids_below
 from silo_server.services.releases import NUMBERED, list_releases
 from silo_server.values import Item
 from silo_server.web.accounts import Reader, Writer
@@ -121,7 +122,7 @@ def activity_page(
         asked = EventQuery(names, user.strip(), number, days["since"], days["until"])
         with suppress(NotFoundError):
             if inside and number:
-                asked = replace(asked, inside=tree.ids_below(get_item(tx, number, include_archived=True)))
+                asked = replace(asked, inside=ids_below(get_item(tx, number, include_archived=True)))
         if newer_than is None:
             part = part_of(partial(log.newest, tx, asked), MOST, before, after)
         else:

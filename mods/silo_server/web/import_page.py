@@ -25,7 +25,20 @@ from silo_server.errors import TooLargeError
 from silo_server.routes.call import Call
 from silo_server.schema import find_schema
 from silo_server.services.bom import imports
-from silo_server.services.bom.imports import NOTHING, Allowed, Layout
+from silo_server.services.bom.import_table import (
+    BOM,
+    DELIMITERS,
+    HEADER_WITHIN,
+    MAX_COLUMNS,
+    Layout,
+    Table,
+    as_csv,
+    first_lines,
+    guess_of,
+    likely_delimiter,
+    read_csv,
+)
+from silo_server.services.bom.imports import NOTHING, Allowed
 from silo_server.services.file_store import clean_name
 from silo_server.services.items import get_item
 from silo_server.web.accounts import Writer
@@ -66,11 +79,11 @@ def check(call: Writer, part_number: str, form: Form) -> Response:
     def show(upload: Upload | None, layout: Layout | None, problem: Problem) -> Response:
         return _show(call, part_number, upload, layout, problem, allowed)
 
-    return checked(form, imports.BOM, show)
+    return checked(form, BOM, show)
 
 
 def checked(
-    form: FormData, of: imports.Table, show: Callable[[Upload | None, Layout | None, Problem], Response]
+    form: FormData, of: Table, show: Callable[[Upload | None, Layout | None, Problem], Response]
 ) -> Response:
     """Show what a file would do, or why it cannot be read."""
     upload, layout = None, None
@@ -87,7 +100,7 @@ def apply(call: Writer, part_number: str, form: Form) -> Response:
     """Import the file; if the BOM has changed since the check, check it again instead."""
     upload, layout, allowed = carried(form), layout_of(form), _allowed(form)
     try:
-        records = imports.read_csv(upload.data, call.server.settings.max_merge_entries, layout)
+        records = read_csv(upload.data, call.server.settings.max_merge_entries, layout)
         with call.write() as tx:
             plan, change, _item = imports.apply_import(
                 tx, part_number, records, upload.name, whole(form, "version"), allowed
@@ -129,7 +142,7 @@ class Problem:
         return cls(str(error), error.status_hint)
 
 
-def layout_of(form: FormData, of: imports.Table = imports.BOM) -> Layout | None:
+def layout_of(form: FormData, of: Table = BOM) -> Layout | None:
     """Read how the person wants the file to be read; None if that was not chosen."""
     if "header" not in form:
         return None
@@ -137,9 +150,9 @@ def layout_of(form: FormData, of: imports.Table = imports.BOM) -> Layout | None:
     columns = {role: whole(form, f"column_{role}") for role in of.roles}
     delimiter = form.get("delimiter")
     return Layout(
-        delimiter if isinstance(delimiter, str) and delimiter in imports.DELIMITERS else ",",
-        min(whole(form, "header") or 0, imports.HEADER_WITHIN - 1),
-        {role: at for role, at in columns.items() if at is not None and at < imports.MAX_COLUMNS},
+        delimiter if isinstance(delimiter, str) and delimiter in DELIMITERS else ",",
+        min(whole(form, "header") or 0, HEADER_WITHIN - 1),
+        {role: at for role, at in columns.items() if at is not None and at < MAX_COLUMNS},
         marks.get(text(form, "mark")),
     )
 
@@ -152,7 +165,7 @@ def _show(
     problem: Problem = Problem(),
     allowed: Allowed = NOTHING,
 ) -> Response:
-    records = imports.read_csv(upload.data, call.server.settings.max_merge_entries, layout) if upload else ()
+    records = read_csv(upload.data, call.server.settings.max_merge_entries, layout) if upload else ()
     with call.read() as tx:
         item = get_item(tx, part_number)
         plan = imports.plan_import(tx, part_number, records, allowed) if upload else None
@@ -188,10 +201,10 @@ _LABELS = {
 }
 
 
-def reading(file: Upload, layout: Layout | None, of: imports.Table = imports.BOM) -> dict[str, Any]:
+def reading(file: Upload, layout: Layout | None, of: Table = BOM) -> dict[str, Any]:
     """Describe how the file is read, for the form in which a person changes that."""
-    layout_read = layout or imports.guess_of(file.data, of) or Layout(imports.likely_delimiter(file.data), 0)
-    lines = imports.first_lines(file.data, layout_read.delimiter, layout_read.header + 6)
+    layout_read = layout or guess_of(file.data, of) or Layout(likely_delimiter(file.data), 0)
+    lines = first_lines(file.data, layout_read.delimiter, layout_read.header + 6)
     header = lines[layout_read.header] if layout_read.header < len(lines) else []
     width = max(map(len, lines), default=0)
     samples = lines[layout_read.header + 1 :]
@@ -199,7 +212,7 @@ def reading(file: Upload, layout: Layout | None, of: imports.Table = imports.BOM
         "layout": layout_read,
         "chosen": layout is not None,
         "lines": [" | ".join(cells)[:60] for cells in lines],
-        "delimiters": imports.DELIMITERS,
+        "delimiters": DELIMITERS,
         "roles": [(role, _(_LABELS.get(role, role.replace("_", " ").capitalize()))) for role in of.roles],
         "needed": of.needed,
         "columns": [_name_of(index, header, samples) for index in range(width)],
@@ -214,13 +227,13 @@ def _name_of(index: int, header: Sequence[str], samples: Sequence[Sequence[str]]
     )
 
 
-def uploaded(form: FormData, of: imports.Table) -> Upload:
+def uploaded(form: FormData, of: Table) -> Upload:
     file = form.get("file")
     if not isinstance(file, UploadFile) or not file.filename:
         raise RejectedError(_("No file was chosen."))
     data = file.file.read(MOST_BYTES + 1)
     if len(data) <= MOST_BYTES:
-        data = imports.as_csv(data, of)
+        data = as_csv(data, of)
     if len(data) > MOST_BYTES:
         raise TooLargeError(
             _("The file is larger than %(size)s MiB; this cannot be a BOM.", size=MOST_BYTES // 2**20)

@@ -27,8 +27,8 @@ from silo_server.routes.call import Call
 from silo_server.routes.items import numbered, store_file
 from silo_server.schema import ITEM_TYPES, Category, find_schema, text_hints
 from silo_server.services import items as service
-from silo_server.services.bom.tree import where_used
 from silo_server.services.items import ItemChange, NewItem, get_item
+from silo_server.services.product.where_used import where_used
 from silo_server.services.releases import draft_of
 from silo_server.services.revisions import RevisionOrigin
 from silo_server.values import Document, Item, Revision

@@ -28,7 +28,6 @@ from silo_server.fields import names_of
 from silo_server.routes.items import told_of
 from silo_server.schema import ITEM_TYPES, find_schema
 from silo_server.services import documents, revisions
-from silo_server.services.bom import tree
 from silo_server.services.bom.last_sync import in_sentences, last_sync
 from silo_server.services.bom.lines import lines_of_many
 from silo_server.services.bom.summary import (
@@ -42,11 +41,17 @@ from silo_server.services.bom.summary import (
     summaries,
     summary_of,
 )
-from silo_server.services.bom.tree import RolledItem
 from silo_server.services.documents import documents_holding, get_document
 from silo_server.services.following import is_followed
 from silo_server.services.items import ItemQuery, get_item, list_items
 from silo_server.services.looks import last_look
+from silo_server.services.product.amounts import Exact, multiplied
+from silo_server.services.product.flat import FlatRow, flatten, leaves_in
+from silo_server.services.product.graph import MAX_DEPTH, Graph, load_graph
+from silo_server.services.product.line_filter import found_parts, leading_to, sought
+from silo_server.services.product.parts import RolledItem, parts_of, some_parts
+from silo_server.services.product.rollup import roll_up_cost, roll_up_mass
+from silo_server.services.product.where_used import use_counts, where_used
 from silo_server.values import Item, Line
 from silo_server.web.accounts import Reader
 from silo_server.web.item_edit_page import shown_properties
@@ -77,7 +82,7 @@ class Look:
     type: Annotated[str, Query(max_length=20)] = ""
     sort: Annotated[str, Query(max_length=20)] = ""
     page: Annotated[int, Query(ge=1, le=10**9)] = 1
-    depth: Annotated[int, Query(ge=0, le=tree.MAX_DEPTH)] = 0
+    depth: Annotated[int, Query(ge=0, le=MAX_DEPTH)] = 0
     flip: Annotated[str, Query(max_length=20_000)] = ""
     pieces: Annotated[int, Query(ge=1, le=MOST_PIECES)] = 1
     beside: Annotated[str, Query(max_length=64)] = ""
@@ -117,7 +122,7 @@ class Branch:
     line: Line
     part: RolledItem
     depth: int
-    total: tree.Exact
+    total: Exact
     worth: MassAndCost
     marks: Sequence[str] = ()
     key: str = ""
@@ -141,7 +146,7 @@ class StructureRow(NamedTuple):
 
     line: Line
     depth: int
-    total: tree.Exact
+    total: Exact
     above: str | None = None
     is_open: bool = False
 
@@ -160,7 +165,7 @@ class ShownStructure:
         the levels that are open, or the whole for a filter or the flat list.
     """
 
-    def __init__(self, tx: Tx, graph: tree.Graph, look: Look, page_rows: int = PAGE_ROWS) -> None:
+    def __init__(self, tx: Tx, graph: Graph, look: Look, page_rows: int = PAGE_ROWS) -> None:
         self._tx = tx
         self.graph = graph
         self.look = look
@@ -171,25 +176,25 @@ class ShownStructure:
     @cached_property
     def parts(self) -> Mapping[int, RolledItem]:
         """Read what a filter looks in, for all of the graph."""
-        return tree.parts_of(self._tx, self.graph)
+        return parts_of(self._tx, self.graph)
 
     @cached_property
     def fitting(self) -> Callable[[Line], bool]:
         """Make the test of lines for the view's filter; without a filter it reads nothing."""
         look = self.look
-        return tree.sought(look.q, look.type, self.parts) if look.is_filtered else lambda _line: True
+        return sought(look.q, look.type, self.parts) if look.is_filtered else lambda _line: True
 
     @cached_property
-    def leaves(self) -> Sequence[tree.FlatRow]:
+    def leaves(self) -> Sequence[FlatRow]:
         """Add up the flat list, unfiltered."""
-        return tree.flatten(self.graph)
+        return flatten(self.graph)
 
     @cached_property
-    def found(self) -> Sequence[tree.FlatRow]:
+    def found(self) -> Sequence[FlatRow]:
         """Find the parts that match the filter: of the flat list, or first on each way down the tree."""
         if self.look.is_flat:
             return [row for row in self.leaves if self.fitting(row.line)]
-        return tree.found_parts(self.graph, self.fitting)
+        return found_parts(self.graph, self.fitting)
 
     def lines_of(self, item_id: int, level: int) -> Sequence[Line]:
         """Return the lines below a row of this level; below the open levels read them only when needed."""
@@ -207,7 +212,7 @@ class ShownStructure:
     def _known(self, children: Collection[int]) -> dict[int, tuple[RolledItem, MassAndCost, Summary | None]]:
         """Read each child, its mass and cost, and its summary; without a BOM it has what it states."""
         # A filter has read all of them.
-        parts = self.parts if self.look.is_filtered else tree.some_parts(self._tx, children)
+        parts = self.parts if self.look.is_filtered else some_parts(self._tx, children)
         by_item = summaries(self._tx, {child for child in children if parts[child].has_bom})
         return {
             child: (parts[child], found.as_part if found else own_worth(parts[child].properties), found)
@@ -265,7 +270,7 @@ def tree_page(shown: ShownStructure, total: int) -> tuple[Page[Branch], Sequence
 def _walk(shown: ShownStructure) -> Iterator[StructureRow]:
     graph, look = shown.graph, shown.look
     filtered, flipped = look.is_filtered, set(look.flips)
-    hit = tree.leading_to(graph, shown.fitting) if filtered else lambda _line: True
+    hit = leading_to(graph, shown.fitting) if filtered else lambda _line: True
     keys = _tree_keys(shown)
 
     @cache
@@ -273,13 +278,13 @@ def _walk(shown: ShownStructure) -> Iterator[StructureRow]:
         below = shown.lines_of(item_id, level)
         return arranged([line for line in below if hit(line)], look.sort, keys) if below else ()
 
-    exact: tree.Exact = look.pieces
+    exact: Exact = look.pieces
     stack = [(1, exact, "", iter(lines_of(graph.root.id, 0)))]
     while stack:
         level, factor, above, lines = stack[-1]
         for line in lines:
-            total = tree.multiplied(factor, line)
-            if line.state.rel_type != "component" or level >= tree.MAX_DEPTH:
+            total = multiplied(factor, line)
+            if line.state.rel_type != "component" or level >= MAX_DEPTH:
                 yield StructureRow(line, level, total)
                 continue
             row = StructureRow(line, level, total, above)
@@ -338,11 +343,11 @@ def flat_page(shown: ShownStructure) -> Page[Branch]:
     return Page(here, table.total, table.found, table.number, table.size)
 
 
-def _flat_keys(shown: ShownStructure) -> Mapping[str, Callable[[tree.FlatRow], Any]]:
-    def properties(row: tree.FlatRow) -> Mapping[str, Any]:
+def _flat_keys(shown: ShownStructure) -> Mapping[str, Callable[[FlatRow], Any]]:
+    def properties(row: FlatRow) -> Mapping[str, Any]:
         return shown.parts[row.line.child_id].properties
 
-    keys: dict[str, Callable[[tree.FlatRow], Any]] = _keys(
+    keys: dict[str, Callable[[FlatRow], Any]] = _keys(
         lambda row: row.line, lambda row: row.total, lambda row: own_worth(properties(row))
     )
     return keys | {
@@ -377,7 +382,7 @@ def item_page(
         item = get_item(tx, part_number, include_archived=True)
         shown = structure_of(tx, item, look)
         history, revision_count = revisions.list_revisions(tx, item, before=revisions_before)
-        used, uses = tree.where_used(tx, item, indirect=True, limit=MOST_USES, offset=used_from)
+        used, uses = where_used(tx, item, indirect=True, limit=MOST_USES, offset=used_from)
         files = documents.shown(tx, documents_holding(tx, item))
         looked, now = last_look(tx, call.actor.own_id, item), tx.stamp
         release, following = state_of(tx, item), is_followed(tx, call.actor.own_id, item)
@@ -413,7 +418,7 @@ def _beside(tx: Tx, part_number: str) -> dict[str, Any] | None:
         item = get_item(tx, part_number, include_archived=True)
     except NotFoundError:
         return None
-    used, uses = tree.where_used(tx, item, limit=5)
+    used, uses = where_used(tx, item, limit=5)
     summary = at_once(tx, {item.id}).get(item.id)
     files = documents.shown(tx, documents_holding(tx, item))
     values = {"item": item, "properties": shown_properties(item), "summary": summary, "files": files}
@@ -468,7 +473,7 @@ def structure_of(tx: Tx, item: Item, look: Look, size: int = PAGE_ROWS) -> dict[
                     most=MOST_READ,
                 )
             )
-        shown = ShownStructure(tx, tree.load_graph(tx, item, None if whole else depth), look, size)
+        shown = ShownStructure(tx, load_graph(tx, item, None if whole else depth), look, size)
         if look.is_filtered:
             values |= {"totals": Totals.narrow(tx, shown.graph, shown.found, shown.parts)}
         if look.is_flat:
@@ -503,15 +508,15 @@ class Totals:
     def narrow(
         cls,
         tx: Tx,
-        graph: tree.Graph,
-        found: Sequence[tree.FlatRow],
+        graph: Graph,
+        found: Sequence[FlatRow],
         parts: Mapping[int, RolledItem],
     ) -> Totals:
         """Add up the totals of what a filter has found."""
-        leaves = tree.leaves_in(graph, found)
+        leaves = leaves_in(graph, found)
         alone = set() if leaves is found else standing_alone(tx, graph)
-        cost = tree.roll_up_cost(leaves, parts)
-        weighed = tree.roll_up_mass(tree.leaves_in(graph, found, alone) if alone else leaves, parts, alone)
+        cost = roll_up_cost(leaves, parts)
+        weighed = roll_up_mass(leaves_in(graph, found, alone) if alone else leaves, parts, alone)
         return cls(
             weighed.total or None,
             cost.totals,
@@ -549,7 +554,7 @@ def items_page(
     )
     with call.read() as tx:
         items, total = list_items(tx, query)
-        used = tree.use_counts(tx, [item.id for item in items])
+        used = use_counts(tx, [item.id for item in items])
         marks = marks_of(tx, items)
     asked = {"q": q, "type": type, "category": category, "archived": "1" if archived else "", "sort": sort}
     return page(

@@ -19,7 +19,7 @@ from silo_server.routes.call import Call
 from silo_server.routes.orders import OrderedBody, asked_of, record_all, records_of
 from silo_server.services import items as item_service
 from silo_server.services import orders, releases, suppliers
-from silo_server.services.bom import imports
+from silo_server.services.bom.import_table import Layout
 from silo_server.services.items import ItemChange, get_item
 from silo_server.services.orders import OrderRequest, OrderRow
 from silo_server.services.suppliers import COLUMNS, EXAMPLES, MOST_PARTS, TABLE, decimal_text, typed_text
@@ -227,7 +227,7 @@ def prices_page(call: Reader) -> Response:
 def _prices(
     call: Call,
     upload: Upload | None = None,
-    layout: imports.Layout | None = None,
+    layout: Layout | None = None,
     problem: Problem = _NO_PROBLEM,
     typed: Sequence[tuple[str, str]] | None = None,
 ) -> Response:

@@ -19,10 +19,12 @@ from silo_server.routes.call import Call
 from silo_server.routes.releases import frozen_now
 from silo_server.services import releases
 from silo_server.services.access.users import get_user
-from silo_server.services.bom import tree
 from silo_server.services.bom.frozen import ProductContent, frozen_product
 from silo_server.services.bom.summary import summary_of
 from silo_server.services.items import get_item
+from silo_server.services.product.flat import flatten
+from silo_server.services.product.graph import MAX_DEPTH
+from silo_server.services.product.tree import expand
 from silo_server.services.releases import Release
 from silo_server.values import Item
 from silo_server.web.accounts import Reader, Writer
@@ -164,10 +166,10 @@ def release_page(
 def _rows(product: ProductContent, *, flat: bool) -> Any:
     """Yield the rows of the table: the line, its depth, its total, mass and cost of one piece."""
     if flat:
-        for row in tree.flatten(product.graph):
+        for row in flatten(product.graph):
             yield row.line, 1, row.total, product.worths[row.line.child_id]
         return
-    for occurrence in tree.expand(product.graph, tree.MAX_DEPTH, MOST_ROWS):
+    for occurrence in expand(product.graph, MAX_DEPTH, MOST_ROWS):
         yield (
             occurrence.line,
             occurrence.depth,

@@ -22,6 +22,7 @@ from silo_server.routes.made_files import XLSX
 from silo_server.routes.requests import FORM_TYPES, ExpectedVersion, idempotency_key
 from silo_server.services.bom import imports
 from silo_server.services.bom.change import locked_parent
+from silo_server.services.bom.import_table import as_csv, read_csv
 from silo_server.services.file_store import clean_name
 from silo_server.user_json import dumps
 
@@ -68,7 +69,7 @@ async def import_csv(
     allowed = imports.Allowed(make, add_up)
 
     def work() -> Response:
-        records = imports.read_csv(imports.as_csv(data), call.server.settings.max_merge_entries)
+        records = read_csv(as_csv(data), call.server.settings.max_merge_entries)
         if dry_run:
             with call.read() as tx:
                 return json_answer(

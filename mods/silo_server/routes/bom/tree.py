@@ -17,32 +17,37 @@ from silo_server.routes.bom import bom_router
 from silo_server.routes.bom.summary import open_to_wire
 from silo_server.routes.call import Viewer
 from silo_server.routes.models import LineOut
-from silo_server.services.bom import tree
 from silo_server.services.bom.line_wire import child_to_wire, line_state_to_wire, revisions_to_wire
 from silo_server.services.bom.summary import standing_alone, summary_of
 from silo_server.services.items import get_item
+from silo_server.services.product.flat import flatten
+from silo_server.services.product.graph import MAX_DEPTH, load_graph
+from silo_server.services.product.parts import parts_of, positive_number
+from silo_server.services.product.rollup import roll_up_cost, roll_up_mass
+from silo_server.services.product.tree import Occurrence, expand
+from silo_server.services.product.where_used import where_used
 from silo_server.values import LineState
 
 router = bom_router("bom")
 
-Depth = Annotated[int, Query(ge=1, le=tree.MAX_DEPTH)]
+Depth = Annotated[int, Query(ge=1, le=MAX_DEPTH)]
 
 
 @router.get("/expanded", response_model=list[LineOut])
-def get_expanded(call: Viewer, part_number: str, depth: Depth = tree.MAX_DEPTH) -> Response:
+def get_expanded(call: Viewer, part_number: str, depth: Depth = MAX_DEPTH) -> Response:
     """Return the tree as rows, parents before their children, with the quantity per parent and in total."""
     with call.server.large_reads.enter():
         with call.read() as tx:
             item = get_item(tx, part_number)
-            graph = tree.load_graph(tx, item, None if depth == tree.MAX_DEPTH else depth)
-        return raw_json(render_expanded(tree.expand(graph, depth, call.server.settings.max_expanded_rows)))
+            graph = load_graph(tx, item, None if depth == MAX_DEPTH else depth)
+        return raw_json(render_expanded(expand(graph, depth, call.server.settings.max_expanded_rows)))
 
 
 @router.get("/flat")
 def get_flat(call: Viewer, part_number: str) -> dict[str, Any]:
     """Return the leaf parts with their quantities, multiplied down the tree and added up; 409 for a cycle."""
     with call.server.large_reads.enter(), call.read() as tx:
-        graph = tree.load_graph(tx, get_item(tx, part_number))
+        graph = load_graph(tx, get_item(tx, part_number))
         summary = summary_of(tx, graph.root)
     return {
         "part_number": graph.root.part_number,
@@ -59,7 +64,7 @@ def get_flat(call: Viewer, part_number: str) -> dict[str, Any]:
                 **({"unreferenced_quantity": plain(row.gone)} if row.gone else {}),
                 **({"in_conflict": True} if row.disputed else {}),
             }
-            for row in tree.flatten(graph)
+            for row in flatten(graph)
         ],
     }
 
@@ -68,8 +73,8 @@ def get_flat(call: Viewer, part_number: str) -> dict[str, Any]:
 def get_cost(call: Viewer, part_number: str) -> dict[str, Any]:
     """Return the flat BOM × ``standard_cost``, per currency; ``missing`` names the parts without a cost."""
     with call.server.large_reads.enter(), call.read() as tx:
-        graph = tree.load_graph(tx, get_item(tx, part_number))
-        cost = tree.roll_up_cost(tree.flatten(graph), tree.parts_of(tx, graph))
+        graph = load_graph(tx, get_item(tx, part_number))
+        cost = roll_up_cost(flatten(graph), parts_of(tx, graph))
     only = next(iter(cost.totals.values())) if len(cost.totals) == 1 else None
     return {
         "part_number": graph.root.part_number,
@@ -85,13 +90,13 @@ def get_cost(call: Viewer, part_number: str) -> dict[str, Any]:
 def get_mass(call: Viewer, part_number: str) -> dict[str, Any]:
     """Return the mass of one piece [kg] from its parts' ``mass_kg``; ``missing`` names parts without one."""
     with call.server.large_reads.enter(), call.read() as tx:
-        graph = tree.load_graph(tx, get_item(tx, part_number))
+        graph = load_graph(tx, get_item(tx, part_number))
         alone = standing_alone(tx, graph)
-        mass = tree.roll_up_mass(tree.flatten(graph, alone), tree.parts_of(tx, graph), alone)
+        mass = roll_up_mass(flatten(graph, alone), parts_of(tx, graph), alone)
     return {
         "part_number": graph.root.part_number,
         "total_mass_kg": mass.total,
-        "stated_mass_kg": tree.positive_number(graph.root.properties, "mass_kg"),
+        "stated_mass_kg": positive_number(graph.root.properties, "mass_kg"),
         "complete": not mass.missing,
         "missing": list(mass.missing),
         "lines": [row._asdict() for row in mass.rows],
@@ -112,7 +117,7 @@ def get_where_used(
     """
     with call.read() as tx:
         item = get_item(tx, part_number)
-        usages, total = tree.where_used(tx, item, indirect=indirect, limit=limit, offset=offset)
+        usages, total = where_used(tx, item, indirect=indirect, limit=limit, offset=offset)
     rows = [
         {
             "parent_part_number": usage.parent.part_number,
@@ -128,7 +133,7 @@ def get_where_used(
     return json_answer(rows, headers={"X-Total-Count": str(total)})
 
 
-def render_expanded(rows: Iterable[tree.Occurrence]) -> bytes:
+def render_expanded(rows: Iterable[Occurrence]) -> bytes:
     """Write the rows as a JSON list, each a line with ``depth`` and ``total_quantity``.
 
     The list is put together from pieces that are made once per child and once per state: a tree of 100 000

@@ -13,11 +13,12 @@ from silo_server.db.tables import (
     bom_conflicts,
 )
 from silo_server.db.transaction import Tx
+from silo_server.services.bom.conflicts import conflicts_in
 from silo_server.services.bom.history import Change, last_merge
 from silo_server.services.bom.line_state import mark_of
 from silo_server.services.bom.lines import lines_of
-from silo_server.services.bom.tree import Graph, conflicts_in
 from silo_server.services.items import get_item
+from silo_server.services.product.graph import Graph
 from silo_server.values import Item, Line
 
 

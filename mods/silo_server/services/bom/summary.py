@@ -49,16 +49,11 @@ from silo_server.db.transaction import EVENT_LOCK, Tx
 from silo_server.db.usage import uses_of
 from silo_server.events import log
 from silo_server.fields import names_of
+from silo_server.services.bom.conflicts import conflicts_in
 from silo_server.services.bom.last_sync import NEVER, last_syncs
 from silo_server.services.bom.lines import select_lines, to_line
-from silo_server.services.bom.tree import (
-    MAX_DEPTH,
-    Graph,
-    children_first,
-    conflicts_in,
-    currency_of,
-    positive_number,
-)
+from silo_server.services.product.graph import MAX_DEPTH, Graph, children_first
+from silo_server.services.product.parts import currency_of, positive_number
 from silo_server.times import stamp
 from silo_server.user_json import dumps
 from silo_server.values import Item, Line

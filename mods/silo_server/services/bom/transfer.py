@@ -34,23 +34,15 @@ from silo_server.db.transaction import Tx
 from silo_server.services.bom.frozen import changes_of, frozen_product
 from silo_server.services.bom.last_sync import in_sentences, last_syncs
 from silo_server.services.bom.summary import MassAndCost, OpenBom, Summary, own_worth, summaries, summary_of
-from silo_server.services.bom.tree import (
-    MAX_DEPTH,
-    Exact,
-    Occurrence,
-    RolledItem,
-    expand,
-    flatten,
-    found_below,
-    leading_to,
-    load_graph,
-    portions,
-    some_parts,
-    sought,
-)
 from silo_server.services.items import (
     get_item,
 )
+from silo_server.services.product.amounts import Exact
+from silo_server.services.product.flat import flatten
+from silo_server.services.product.graph import MAX_DEPTH, load_graph
+from silo_server.services.product.line_filter import found_below, leading_to, sought
+from silo_server.services.product.parts import RolledItem, portions, some_parts
+from silo_server.services.product.tree import Occurrence, expand
 from silo_server.services.releases import get_release
 from silo_server.services.thumbnails import png_size
 from silo_server.times import wire_time

@@ -19,7 +19,7 @@ from silo.bom.left_out import Reason
 from silo_server.db.rows import one_of
 from silo_server.db.tables import INCOMPLETE, UNREFERENCED, assignees, bom_last_syncs, bom_lines, items, users
 from silo_server.db.transaction import Tx
-from silo_server.services.bom.tree import Told, conflicts_in
+from silo_server.services.bom.conflicts import Told, conflicts_in
 
 
 class Waiting(NamedTuple):

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The expanded tree below an item, row by row."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from silo_server.errors import TooLargeError
+from silo_server.services.product.amounts import Exact, multiplied
+from silo_server.services.product.graph import Graph, order_of
+from silo_server.values import Line
+
+
+class Occurrence(NamedTuple):
+    """A line somewhere in the expanded tree. ``depth`` 1 = direct child; ``total`` per one root."""
+
+    line: Line
+    parent_part_number: str
+    depth: int
+    total: Exact
+
+
+def expand(graph: Graph, depth: int, limit: int) -> Iterator[Occurrence]:
+    """Yield the tree as rows, parents before their children. Raises CycleError, TooLargeError."""
+    order_of(graph)  # finds a cycle before it is walked
+    count = 0
+    graph_lines = graph.lines
+    exact: Exact = 1
+    stack = [(graph.root.part_number, 1, exact, iter(graph_lines.get(graph.root.id, ())))]
+    while stack:
+        parent, level, factor, lines = stack[-1]
+        for line in lines:
+            state = line.state
+            total = multiplied(factor, line)
+            count += 1
+            yield Occurrence(line, parent, level, total)
+            below = graph_lines.get(line.child_id)
+            if below and level < depth and state.rel_type == "component":
+                stack.append((line.child_part_number, level + 1, total, iter(below)))
+                break
+        else:
+            stack.pop()
+        if count > limit:
+            raise TooLargeError(
+                f"the expanded BOM of {graph.root.part_number} has more than {limit} lines; "
+                "ask for less with depth="
+            )
