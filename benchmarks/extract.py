@@ -35,8 +35,8 @@ FREECADCMD = os.environ.get("SILO_FREECADCMD") or shutil.which("freecadcmd") or 
 
 BOM = """
 import gc, json, resource, sys, time
-from silo.bom.links import extract
-from silo.bom.roots import choose_assembly
+from silo.bom.walk.links import extract
+from silo.bom.walk.roots import choose_assembly
 from silo.fcstd import Library
 times = []
 for _ in range(int(sys.argv[2])):
@@ -75,8 +75,8 @@ import json, os, resource, sys, time
 import FreeCAD
 top, out, mods = json.loads(os.environ["SILO_ARGS"])
 sys.path.insert(0, mods)
-from silo.bom.links import extract
-from silo.bom.roots import choose_assembly
+from silo.bom.walk.links import extract
+from silo.bom.walk.roots import choose_assembly
 begin = time.perf_counter()
 document = FreeCAD.openDocument(top)
 opened = time.perf_counter()

@@ -21,8 +21,8 @@ ROOT = Path(__file__).resolve().parents[1]
 TOP = ROOT / "examples" / "gearbox" / "TopAssembly.FCStd"
 SILO_MOD = Path(sys.executable).with_name("silo-mod")
 WALK = f"""
-from silo.bom.links import extract
-from silo.bom.roots import choose_assembly
+from silo.bom.walk.links import extract
+from silo.bom.walk.roots import choose_assembly
 from silo.fcstd import Library
 with Library() as library:
     extract(choose_assembly(library.open({str(TOP)!r})))

@@ -13,11 +13,11 @@ from fcstd_writer import Doc, part
 
 from silo.api.address import canonical
 from silo.bom.compare.merge import plan_merge
-from silo.bom.document import relative
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import DocumentError
 from silo.bom.quantities import same_quantity
 from silo.bom.snapshot import from_plain, to_plain
+from silo.bom.walk.document import relative
 from silo.fcstd import open_document, stamp
 from silo.fcstd.container import CENTRAL, LOCAL
 from silo.outbox.entry import Commit

@@ -29,7 +29,6 @@ from xml.sax.saxutils import escape, quoteattr
 
 from silo.api.wire import SourceDocument
 from silo.bom.consolidation import one_hint_each
-from silo.bom.document import relative
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import DocumentError, Exit, InputError, RemoteError, SiloError, counted, listed
 from silo.bom.findings import Finding, FindingCode, Severity
@@ -37,6 +36,7 @@ from silo.bom.items.naming import display_name
 from silo.bom.view.diff_rows import diff_json, diff_rows
 from silo.bom.view.folders import base_folder, project_folder, shorten
 from silo.bom.view.tree_json import entry_json, finding_json
+from silo.bom.walk.document import relative
 from silo.bom_sync.resolved import Resolved, assemblies, blocking, resolve
 from silo.bom_sync.steps import Outcome, Status, SyncApi, server_lines, sync_tree
 from silo.checksums import sha256_of

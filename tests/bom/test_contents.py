@@ -9,9 +9,9 @@ import pytest
 from fakes import Doc, edit
 
 from silo.bom import FindingCode, Severity, extract, extract_bom_links
-from silo.bom.document import LinkProblem
 from silo.bom.entry import Extraction
 from silo.bom.findings import Finding
+from silo.bom.walk.document import LinkProblem
 
 BOLT = ("/v/bolt.FCStd", "Body")
 PLATE = ("/v/plate.FCStd", "Body")

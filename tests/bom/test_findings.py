@@ -12,10 +12,10 @@ from fakes import Doc, edit
 
 from silo.bom import BomEntry, Finding, FindingCode, Severity, choose_assembly, diff_bom, extract
 from silo.bom.consolidation import consolidation_findings
-from silo.bom.document import LinkProblem
 from silo.bom.findings import respelt_findings
 from silo.bom.items.resolve import unregistered_findings
-from silo.bom.roles import Files, Reader
+from silo.bom.walk.document import LinkProblem
+from silo.bom.walk.roles import Files, Reader
 
 
 class Scene:

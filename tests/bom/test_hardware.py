@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from silo.bom import choose_assembly, extract
 from silo.bom.entry import Extraction
 from silo.bom.findings import FindingCode
-from silo.bom.standard import designated, standard_uuid
+from silo.bom.walk.standard import designated, standard_uuid
 
 M4 = "ISO 4762 M4×16"
 

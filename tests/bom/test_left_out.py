@@ -46,7 +46,7 @@ def test_a_line_is_known_by_all_its_components() -> None:
 
 def test_a_standard_part_has_no_file_to_be_missing() -> None:
     """Its key is its designation."""
-    from silo.bom.standard import standard_uuid
+    from silo.bom.walk.standard import standard_uuid
 
     screw = BomEntry("/v/top.FCStd", standard_uuid("ISO 4762 M4×16"), standard="ISO 4762 M4×16")
     assert screw.is_standard

@@ -9,10 +9,10 @@ import pytest
 from fakes import Doc, Obj
 
 from silo.bom import extract
-from silo.bom.document import LinkProblem
 from silo.bom.findings import FindingCode
-from silo.bom.roots import choose_assembly
 from silo.bom.walk.arrays import array_count, draft_count
+from silo.bom.walk.document import LinkProblem
+from silo.bom.walk.roots import choose_assembly
 
 ITEM = "11111111-2222-4333-8444-555555555555"
 

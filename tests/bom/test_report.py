@@ -15,13 +15,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from silo.bom import BomEntry, Extraction, Finding, FindingCode, Place, Severity, diff_bom, extract
-from silo.bom.document import relative
 from silo.bom.errors import InputError
 from silo.bom.snapshot import from_plain, to_plain
 from silo.bom.view.diff_rows import diff_json
 from silo.bom.view.flat_list import flat_counts, flat_json
 from silo.bom.view.folders import project_folder, shorten
 from silo.bom.view.tree_json import bom_json, tree_size
+from silo.bom.walk.document import relative
 
 
 def entry(name: str, quantity: int = 1, *children: BomEntry, level: int = 1) -> BomEntry:

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.bom.key import Key
-from silo.bom.links import Graph, Rings, strongly_connected
+from silo.bom.walk.links import Graph, Rings, strongly_connected
 
 
 def graph(**edges: str) -> Graph:

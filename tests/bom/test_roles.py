@@ -14,13 +14,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.bom import choose_assembly, extract
-from silo.bom.document import LinkProblem
 from silo.bom.errors import InputError
 from silo.bom.findings import FindingCode
-from silo.bom.roots import fates, silent_reader
 from silo.bom.walk.arrays import draft_count
 from silo.bom.walk.chains import chains
 from silo.bom.walk.contents import ObjectRole
+from silo.bom.walk.document import LinkProblem
+from silo.bom.walk.roots import fates, silent_reader
 from silo.inertia.geometry.freecad import NOTHING, StatedMaterial, Walk
 
 UUID = "5d8d3a1e-6f0b-4c7a-9a54-2f1d7c0e4b36"

@@ -10,7 +10,7 @@ from fakes import BareDocument, Doc, edit
 
 from silo.bom import FindingCode, choose_assembly, extract
 from silo.bom.errors import InputError
-from silo.bom.roots import find_assemblies
+from silo.bom.walk.roots import find_assemblies
 
 BOLT = ("/v/bolt.FCStd", "Body")
 

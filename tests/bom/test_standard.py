@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from fakes import Doc
 
-from silo.bom.standard import NAMESPACE, designated, designation, same_articles, standard_uuid
+from silo.bom.walk.standard import NAMESPACE, designated, designation, same_articles, standard_uuid
 
 LATER_USED_OF = {
     "type": "Type",

@@ -9,8 +9,8 @@ import pytest
 from fakes import Doc, edit
 
 from silo.bom import FindingCode, Severity, extract
-from silo.bom.document import LinkProblem, located, split_sub_name
-from silo.bom.targets import resolve_target
+from silo.bom.walk.document import LinkProblem, located, split_sub_name
+from silo.bom.walk.targets import resolve_target
 
 
 @pytest.fixture

@@ -14,8 +14,8 @@ import pytest
 from fcstd_writer import Doc, Raw, locals_, part
 from server_testing import Api
 
-from silo.bom.links import extract
-from silo.bom.roots import choose_assembly
+from silo.bom.walk.links import extract
+from silo.bom.walk.roots import choose_assembly
 from silo.fcstd import Library
 from silo.outbox.store import Store
 from silo.project_folder import PROJECT_FILE, Project, ProjectEntry

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from public_projects import ASSEMBLIES
 
-from silo.bom.standard import standard_uuid
+from silo.bom.walk.standard import standard_uuid
 from silo.fcstd import open_document
 
 PROJECT = ASSEMBLIES / "asm4-examples"

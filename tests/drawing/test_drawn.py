@@ -22,10 +22,10 @@ from public_projects import ASSEMBLIES
 
 from silo.api.wire import Structure
 from silo.bom.errors import NotFoundError
-from silo.bom.links import extract
-from silo.bom.roots import choose_assembly
-from silo.bom.standard import standard_uuid
 from silo.bom.view.flat_list import flat_lines
+from silo.bom.walk.links import extract
+from silo.bom.walk.roots import choose_assembly
+from silo.bom.walk.standard import standard_uuid
 from silo.drawing import models as making
 from silo.drawing.models import KernelDrawer, draw, send_models
 from silo.fcstd import Library

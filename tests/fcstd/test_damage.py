@@ -11,8 +11,8 @@ from fcstd_writer import Doc, Raw, XLink, locals_, part, save_xml
 from silo.bom.entry import Extraction
 from silo.bom.errors import DocumentError
 from silo.bom.findings import Finding, FindingCode, Place
-from silo.bom.links import extract
-from silo.bom.roots import choose_assembly
+from silo.bom.walk.links import extract
+from silo.bom.walk.roots import choose_assembly
 from silo.fcstd import open_document
 
 UNCLOSED = "<Unclosed>"

@@ -13,10 +13,10 @@ from hunting import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from silo.bom.document import LinkProblem
 from silo.bom.entry import Extraction
 from silo.bom.errors import DocumentError
-from silo.bom.links import extract
+from silo.bom.walk.document import LinkProblem
+from silo.bom.walk.links import extract
 from silo.fcstd import Library, Limits, stamp
 
 LIMITS = Limits(document_xml=1 << 20, packed=1 << 20, side_entry=1 << 16, objects=1000)

@@ -10,8 +10,8 @@ from fcstd_writer import Doc, XLink, locals_, part
 
 from silo.bom.entry import Extraction
 from silo.bom.findings import FindingCode
-from silo.bom.links import extract
-from silo.bom.roots import choose_assembly
+from silo.bom.walk.links import extract
+from silo.bom.walk.roots import choose_assembly
 from silo.fcstd import open_document
 
 ARRAYS = ["Linear", "Polar", "Circular", "Path", "Point"]

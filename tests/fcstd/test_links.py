@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from fcstd_writer import Doc, XLink, container, locals_, part
 
-from silo.bom.document import LinkProblem
 from silo.bom.errors import DocumentError
 from silo.bom.findings import FindingCode
-from silo.bom.links import extract
+from silo.bom.walk.document import LinkProblem
+from silo.bom.walk.links import extract
 from silo.fcstd import FcstdObject, Library, Limits, open_document
 from silo.fcstd.contents import FileContents
 from silo.locator import refusal

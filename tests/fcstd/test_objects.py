@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 from fcstd_writer import Doc, Raw, Vector, XLink, container, locals_, part
 
-from silo.bom.document import DocumentLike, ObjectLike, document_property, own
 from silo.bom.errors import DocumentError
-from silo.bom.targets import is_mirrored
+from silo.bom.walk.document import DocumentLike, ObjectLike, document_property, own
+from silo.bom.walk.targets import is_mirrored
 from silo.fcstd import FcstdObject, Library, open_document
 from silo.fcstd.type_tree import PARENTS, ancestors
 

@@ -11,7 +11,7 @@ import pytest
 from fcstd_writer import Doc, Raw, locals_
 
 from silo.bom.errors import DocumentError, InputError
-from silo.bom.links import extract
+from silo.bom.walk.links import extract
 from silo.fcstd import open_document
 from silo.fcstd.relink import Relinked, read_back, relink
 

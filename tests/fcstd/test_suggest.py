@@ -9,7 +9,7 @@ from typing import Any
 
 from fcstd_writer import Doc, XLink, locals_
 
-from silo.bom.links import extract
+from silo.bom.walk.links import extract
 from silo.fcstd import open_document
 from silo.fcstd.suggest import with_suggestions
 

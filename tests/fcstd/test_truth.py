@@ -14,9 +14,9 @@ from public_projects import ASSEMBLIES
 
 from silo.bom.entry import walk_entries
 from silo.bom.findings import FindingCode
-from silo.bom.links import extract
-from silo.bom.roots import choose_assembly
 from silo.bom.view.flat_list import flat_lines
+from silo.bom.walk.links import extract
+from silo.bom.walk.roots import choose_assembly
 from silo.fcstd import Library
 
 TRUTHS = sorted(ASSEMBLIES.glob("*/truth/*.json"))

@@ -14,9 +14,9 @@ import pytest
 from fcstd_writer import Doc, Local, Raw, Vector, XLink, container, locals_, part, save_xml
 
 from silo.bom.errors import DocumentError
-from silo.bom.links import extract
-from silo.bom.roots import choose_assembly
 from silo.bom.walk.kinds import Kind
+from silo.bom.walk.links import extract
+from silo.bom.walk.roots import choose_assembly
 from silo.bom.walk.survey import Survey, survey_of
 from silo.fcstd import FcstdDocument, FcstdObject, Library, Limits, open_document
 

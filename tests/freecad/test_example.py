@@ -11,8 +11,8 @@ from freecad_cases import answers, machines
 from freecad_cases.machines import REPOSITORY
 
 from silo.bom.entry import Extraction
-from silo.bom.links import extract
-from silo.bom.roots import choose_assembly
+from silo.bom.walk.links import extract
+from silo.bom.walk.roots import choose_assembly
 from silo.fcstd import Library
 from silo.freecads.run import run_freecad
 

@@ -20,8 +20,8 @@ from freecad_cases.machines import MOSTLY_ENDS
 from gui_cases.window import Window
 
 from silo.bom.entry import Extraction, walk_entries
-from silo.bom.links import extract
-from silo.bom.roots import choose_assembly
+from silo.bom.walk.links import extract
+from silo.bom.walk.roots import choose_assembly
 from silo.fcstd import Library
 from silo.freecads.run import run_freecad
 

@@ -16,8 +16,8 @@ from server_testing import sqlite_database
 from silo.api.client import SiloClient
 from silo.bom.entry import Extraction
 from silo.bom.findings import FindingCode
-from silo.bom.links import extract
-from silo.bom.roots import choose_assembly
+from silo.bom.walk.links import extract
+from silo.bom.walk.roots import choose_assembly
 from silo.cli.main import main
 from silo.fcstd import Library
 from silo.fcstd.linked import identity_in

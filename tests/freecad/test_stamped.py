@@ -13,8 +13,8 @@ from freecad_cases.machines import WANTED
 from freecad_cases.truth import BOLT, PLATE, SUB
 
 from silo.bom.entry import Extraction
-from silo.bom.links import extract
-from silo.bom.roots import choose_assembly
+from silo.bom.walk.links import extract
+from silo.bom.walk.roots import choose_assembly
 from silo.fcstd import Library, stamp
 from silo.freecads.run import run_freecad
 

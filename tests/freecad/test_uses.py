@@ -16,8 +16,8 @@ from freecad_cases.machines import WANTED
 
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.findings import FindingCode
-from silo.bom.standard import STANDARD_PARTS
 from silo.bom.view.flat_list import flat_lines
+from silo.bom.walk.standard import STANDARD_PARTS
 from silo.fcstd import Library
 from silo.freecads.run import run_freecad
 from silo.inertia.geometry.fcstd import Entries, StoredFacts

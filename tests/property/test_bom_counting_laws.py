@@ -20,11 +20,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from silo.bom import extract
-from silo.bom.document import LinkProblem
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.findings import FindingCode
-from silo.bom.standard import STANDARD_PARTS
 from silo.bom.view.flat_list import flat_counts
+from silo.bom.walk.document import LinkProblem
+from silo.bom.walk.standard import STANDARD_PARTS
 
 Key = tuple[str, str]
 

@@ -25,8 +25,8 @@ from hypothesis import strategies as st
 from public_projects import ASSEMBLIES
 
 from silo.bom.errors import InputError
-from silo.bom.links import extract
-from silo.bom.roots import choose_assembly
+from silo.bom.walk.links import extract
+from silo.bom.walk.roots import choose_assembly
 from silo.fcstd import Library
 from silo.fcstd.linked import recorded_paths
 from silo.files import documents_in

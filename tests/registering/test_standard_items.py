@@ -11,7 +11,7 @@ import pytest
 
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.items.proposal import Proposal, crowded_files
-from silo.bom.standard import standard_uuid
+from silo.bom.walk.standard import standard_uuid
 from silo.bom_sync.memory import Memory
 from silo.bom_sync.resolved import resolve
 from silo.bom_sync.standard_items import by_description, find_items

@@ -20,8 +20,8 @@ from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS
 
 from silo.api.wire import Structure
-from silo.bom.standard import standard_uuid
 from silo.bom.walk.contents import Lost
+from silo.bom.walk.standard import standard_uuid
 from silo.drawing.models import FileWalk, KernelDrawer, draw
 from silo.fcstd import Library
 from silo.fcstd.linked import recorded_paths

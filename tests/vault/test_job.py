@@ -20,8 +20,8 @@ from hypothesis import strategies as st
 
 from silo.batch import SyncOptions, TopResult
 from silo.bom.errors import AuthError, SiloError, UnreachableError
-from silo.bom.links import extract
-from silo.bom.roots import choose_assembly
+from silo.bom.walk.links import extract
+from silo.bom.walk.roots import choose_assembly
 from silo.bom_sync.resolved import resolve
 from silo.bom_sync.steps import Status, sync_tree
 from silo.fcstd import Library

@@ -17,8 +17,8 @@ from silo.api.files import download_revision
 from silo.api.wire import FrozenFile, LinkedFile, Release
 from silo.bom.entry import Extraction
 from silo.bom.errors import DocumentError, InputError, NotFoundError, ServerFaultError
-from silo.bom.links import extract
-from silo.bom.roots import choose_assembly
+from silo.bom.walk.links import extract
+from silo.bom.walk.roots import choose_assembly
 from silo.fcstd import Library
 from silo.fcstd.linked import place_of, recorded_paths
 from silo.outbox.entry import Commit

@@ -16,18 +16,18 @@ if TYPE_CHECKING:
     from silo.bom.entry import BomEntry, Extraction
     from silo.bom.findings import Finding, FindingCode, Place, Severity
     from silo.bom.items.resolve import resolve_part_numbers
-    from silo.bom.links import extract, extract_bom_links
-    from silo.bom.roots import choose_assembly
+    from silo.bom.walk.links import extract, extract_bom_links
+    from silo.bom.walk.roots import choose_assembly
 
 _HOME = {
     "compare.difference": ("diff_bom",),
     "compare.merge": ("MergePlan", "apply_merge", "plan_merge"),
     "findings": ("Finding", "FindingCode", "Place", "Severity"),
-    "links": ("extract", "extract_bom_links"),
+    "walk.links": ("extract", "extract_bom_links"),
     "compare.bom_diff": ("BomChange", "BomDiff", "QuantityChange"),
     "entry": ("BomEntry", "Extraction"),
     "items.resolve": ("resolve_part_numbers",),
-    "roots": ("choose_assembly",),
+    "walk.roots": ("choose_assembly",),
 }
 
 __all__ = [

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.frozen import Frozen, freeze
-from silo.bom.standard import STANDARD_PARTS, standard_uuid
+from silo.bom.walk.standard import STANDARD_PARTS, standard_uuid
 
 
 @dataclass(frozen=True)

@@ -16,12 +16,12 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
-from silo.bom.document import relative
 from silo.bom.entry import BomEntry
 from silo.bom.findings import Finding
 from silo.bom.items.naming import display_name
-from silo.bom.standard import STANDARD_PARTS
 from silo.bom.view.folders import shorten
+from silo.bom.walk.document import relative
+from silo.bom.walk.standard import STANDARD_PARTS
 
 
 class Reason(StrEnum):

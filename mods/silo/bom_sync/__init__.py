@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from silo.bom.compare.merge import plan_merge
     from silo.bom.entry import BomEntry, Extraction
     from silo.bom.items.resolve import resolve_part_numbers
-    from silo.bom.links import extract, extract_bom_links
+    from silo.bom.walk.links import extract, extract_bom_links
     from silo.bom_sync.resolved import Resolved, resolve
     from silo.bom_sync.steps import Outcome, Status, SyncApi, compare, sync, sync_tree
 

@@ -17,12 +17,12 @@ from silo.bom.compare.bom_diff import BomDiff
 from silo.bom.compare.difference import diff_bom
 from silo.bom.compare.merge import MergePlan, plan_merge
 from silo.bom.consolidation import consolidation_findings
-from silo.bom.document import relative
 from silo.bom.entry import BomEntry, Extraction, walk_entries
 from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.items.lookup import ItemLookup, Known, look_up
 from silo.bom.items.resolve import numbered_findings, resolve_with, unregistered_findings
 from silo.bom.left_out import LeftOut, components_of, left_out_of
+from silo.bom.walk.document import relative
 from silo.bom_sync.standard_items import find_items
 
 

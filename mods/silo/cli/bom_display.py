@@ -14,7 +14,6 @@ from rich.tree import Tree
 
 from silo import spoken
 from silo.bom.compare.bom_diff import BomDiff
-from silo.bom.document import relative
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import counted
 from silo.bom.findings import Finding, Severity
@@ -22,6 +21,7 @@ from silo.bom.items.naming import display_name
 from silo.bom.view.diff_rows import diff_rows
 from silo.bom.view.folders import base_folder, shorten
 from silo.bom.view.tree_json import MOST_LINES, check_tree_size
+from silo.bom.walk.document import relative
 from silo.cli.terminal import plain, table_of
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 from silo.bom.entry import Extraction, walk_entries
 from silo.bom.errors import InputError, SeveralAssembliesError, SiloError
 from silo.bom.findings import respelt_findings
-from silo.bom.links import extract
-from silo.bom.roots import choose_assembly
+from silo.bom.walk.links import extract
+from silo.bom.walk.roots import choose_assembly
 from silo.cli.options import EACH
 from silo.cli.progress import count_steps
 from silo.platform import processors

@@ -9,8 +9,8 @@ from rich.panel import Panel
 from rich.text import Text
 
 from silo import spoken
-from silo.bom.document import relative
 from silo.bom.items.naming import display_name
+from silo.bom.walk.document import relative
 from silo.cli.terminal import plain
 
 if TYPE_CHECKING:

@@ -30,16 +30,16 @@ from typing import IO, TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from silo.api.wire import ModelProduct, Stated, Structure, Use
-from silo.bom.document import derived, label_of, object_name, own
 from silo.bom.errors import CancelledError, ConfigError, DocumentError, InputError, SiloError, counted
 from silo.bom.key import Key
-from silo.bom.roots import choose_assembly, find_assemblies
-from silo.bom.standard import standard_uuid
 from silo.bom.text import with_allowed_characters
 from silo.bom.walk.arrays import elements
 from silo.bom.walk.contents import Contents, Contribution, Lost
+from silo.bom.walk.document import derived, label_of, object_name, own
 from silo.bom.walk.identity import identity_of
 from silo.bom.walk.kinds import Kind, is_container
+from silo.bom.walk.roots import choose_assembly, find_assemblies
+from silo.bom.walk.standard import standard_uuid
 from silo.bom.walk.survey import survey_of
 from silo.checksums import content_hash
 from silo.drawing import Glb, cube, shaded
@@ -249,7 +249,7 @@ class FileWalk(Walk):
             here = [*self.looks.overrides(obj), *here][:count]
         if None in here:
             steps = [step.obj for step in self._reader.resolve(obj).way[1:]] if node.kind is Kind.LINK else []
-            below = next((inner.obj for inner, _ in node.below if key in inner.worth), None)
+            below = next((inner.obj for inner, _ in node.shown_objects if key in inner.brings), None)
             under = next(filter(None, map(self.looks.override, [*steps, *([below] if below else [])])), None)
             here = [colour or under for colour in here]
         return [list(colour) if colour else None for colour in here]

@@ -12,8 +12,8 @@ from functools import cached_property
 from struct import Struct
 from typing import TYPE_CHECKING, Any, cast
 
-from silo.bom.document import LinkProblem as Problem
 from silo.bom.findings import FindingCode
+from silo.bom.walk.document import LinkProblem as Problem
 from silo.bom.walk.kinds import Kind
 from silo.fcstd.container import ContainerFile, Inflater, ZipEntry
 from silo.fcstd.errors import FcstdError

@@ -7,9 +7,9 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from silo.bom.document import LinkProblem
 from silo.bom.errors import InputError
 from silo.bom.findings import FindingCode
+from silo.bom.walk.document import LinkProblem
 from silo.fcstd.container import FileState
 from silo.fcstd.contents import FileContents
 from silo.fcstd.document import FcstdDocument
@@ -125,7 +125,7 @@ class Library:
         Like A2plus, it also looks for the file in the folder of the owner, if the file is no longer in its
         place.
         """
-        from silo.bom.roots import choose_assembly
+        from silo.bom.walk.roots import choose_assembly
 
         for recorded in dict.fromkeys((file, os.path.basename(file))):
             location = self.lookups[owner.folders, recorded] = self._locator.find(recorded, owner.folders)
@@ -183,7 +183,7 @@ def open_document(
 
     Raises DocumentError if this very file cannot be read; a broken link is noted on its object.
 
-    >>> from silo.bom.links import extract  # doctest: +SKIP
+    >>> from silo.bom.walk.links import extract  # doctest: +SKIP
     >>> extract(open_document("gearbox.FCStd").getObject("Assembly"))  # doctest: +SKIP
     """
     return Library(root, limits).open(path)

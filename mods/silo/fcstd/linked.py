@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from silo.bom.errors import DocumentError
-from silo.bom.links import file_item
+from silo.bom.walk.links import file_item
 from silo.checksums import content_hash
 from silo.fcstd.container import ContainerFile, document_xml
 from silo.fcstd.expat_reader import Malformed, as_utf8, start_tags

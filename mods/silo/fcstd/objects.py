@@ -12,8 +12,8 @@ from contextlib import suppress
 from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any
 
-from silo.bom.document import LinkProblem as Problem
 from silo.bom.errors import DocumentError
+from silo.bom.walk.document import LinkProblem as Problem
 from silo.fcstd.properties import Properties
 from silo.fcstd.type_tree import ancestors, is_listed
 from silo.fcstd.values import ABSENT, LocalList, Ref, RefList, ShapeFile, SideEntry, Style, Vector

@@ -15,8 +15,8 @@ import unicodedata
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
-from silo.bom.document import own
 from silo.bom.errors import DocumentError
+from silo.bom.walk.document import own
 from silo.bom.walk.identity import META_KEY, meta_key, own_identity
 from silo.fcstd import expat_reader
 from silo.fcstd.container import ContainerFile, FileState, ZipEntry

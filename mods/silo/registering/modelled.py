@@ -3,7 +3,7 @@
 
 Nothing here counts: an identity on the object does, and the user gives it. The rules of this module:
 
-* what is shown, how often, and what is used up, the count says (:mod:`silo.bom.roles`);
+* what is shown, how often, and what is used up, the count says (:mod:`silo.bom.walk.roles`);
 * equal copies are proposed as one article: the same shape, or the same label but for FreeCAD's number.
 """
 
@@ -15,13 +15,13 @@ from collections.abc import Callable, Iterable, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Any
 
-from silo.bom.document import label_of, located, object_name, own
 from silo.bom.entry import BomEntry
 from silo.bom.errors import DocumentError, InputError, SiloError
 from silo.bom.items.naming import is_generic
-from silo.bom.roles import DECLARABLE
-from silo.bom.roots import choose_assembly, silent_reader
+from silo.bom.walk.document import label_of, located, object_name, own
 from silo.bom.walk.identity import document_identity, own_identity
+from silo.bom.walk.roles import DECLARABLE
+from silo.bom.walk.roots import choose_assembly, silent_reader
 from silo.bom.walk.survey import survey_of
 from silo.fcstd import Library
 from silo.fcstd.objects import FcstdObject

@@ -16,9 +16,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from silo.bom.document import relative
 from silo.bom.errors import InputError
 from silo.bom.headers import plain_cell, safe_cell
+from silo.bom.walk.document import relative
 from silo.registering.candidate import Candidate, CandidateFiles, ComponentState
 from silo.registering.offer import Offer
 from silo.registering.request import AS_UTF_8, ITEM_TYPES, RegistrationRequest, find_item, wrong_name

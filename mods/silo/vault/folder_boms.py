@@ -14,13 +14,13 @@ from pathlib import Path
 from typing import Any
 
 from silo.bom.compare.states import ComparedAssembly
-from silo.bom.document import relative
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import InputError, SiloError
 from silo.bom.findings import Finding, Severity
-from silo.bom.links import extract
-from silo.bom.roots import choose_assembly, find_assemblies
 from silo.bom.view.folders import shorten
+from silo.bom.walk.document import relative
+from silo.bom.walk.links import extract
+from silo.bom.walk.roots import choose_assembly, find_assemblies
 from silo.fcstd import Library
 from silo.files import documents_in
 

@@ -16,10 +16,10 @@ from typing import Any
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import SeveralAssembliesError, SiloError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
-from silo.bom.links import MAX_LEVELS, Rings
 from silo.bom.snapshot import whole_row
-from silo.bom.standard import standard_uuid
+from silo.bom.walk.links import MAX_LEVELS, Rings
 from silo.bom.walk.shared_identity import copied_identity
+from silo.bom.walk.standard import standard_uuid
 from silo.fcstd.suggest import with_suggestions
 from silo.vault.questions import Question, collecting_seldom
 from silo.vault.reading import VaultReader, WalkAnswer

@@ -32,8 +32,8 @@ from silo.bom.errors import (
     RouteMissingError,
     SeveralAssembliesError,
 )
-from silo.bom.links import extract, file_bom
 from silo.bom.walk.identity import held_items
+from silo.bom.walk.links import extract, file_bom
 from silo.checksums import content_hash
 from silo.fcstd import Library
 from silo.fcstd.linked import recorded_paths

@@ -19,9 +19,9 @@ from typing import Any, NamedTuple
 
 from silo.bom.errors import DocumentError, InputError, SeveralAssembliesError
 from silo.bom.findings import respelt_findings
-from silo.bom.links import extract
-from silo.bom.roots import choose_assembly
 from silo.bom.snapshot import to_plain
+from silo.bom.walk.links import extract
+from silo.bom.walk.roots import choose_assembly
 from silo.fcstd.contents import Content, FileContents
 from silo.fcstd.facts import facts_of
 from silo.fcstd.library import Library
@@ -39,7 +39,7 @@ class Question:
     name_only
         ``assembly`` is the internal name of any object that may hold components.
     below
-        the whole tree, or the one assembly alone (:func:`silo.bom.links.extract`).
+        the whole tree, or the one assembly alone (:func:`silo.bom.walk.links.extract`).
     """
 
     path: str

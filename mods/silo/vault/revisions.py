@@ -23,8 +23,8 @@ from silo.bom.compare.two_states import LineChange, compare_assemblies
 from silo.bom.entry import Extraction
 from silo.bom.errors import InputError, listed
 from silo.bom.items.naming import display_name
-from silo.bom.links import extract
-from silo.bom.roots import choose_assembly
+from silo.bom.walk.links import extract
+from silo.bom.walk.roots import choose_assembly
 from silo.fcstd import Library
 from silo.fcstd.contents import FileContents
 from silo.platform import remove_patiently, scratch_folder

@@ -8,7 +8,7 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.errors import DocumentError
-from silo.bom.links import extract, file_item
+from silo.bom.walk.links import extract, file_item
 from silo.freecads.open_documents import open_in_any
 from silo.workbench.commit.desk import CommitAnswer, Look
 from silo.workbench.commit.plan import CommitPlan

@@ -8,7 +8,7 @@ import unittest
 from typing import Any
 
 from silo import FREECAD_PACKAGES
-from silo.bom.links import extract
+from silo.bom.walk.links import extract
 from silo.workbench.freecad import host
 
 APP: Any = vars(host)["FreeCAD"]

@@ -13,9 +13,9 @@ from freecad_cases.truth import Truth
 from silo.bom.entry import BomEntry, Extraction, walk_entries
 from silo.bom.errors import SiloError
 from silo.bom.findings import Finding, Place
-from silo.bom.links import extract
-from silo.bom.roots import choose_assembly
 from silo.bom.snapshot import to_plain
+from silo.bom.walk.links import extract
+from silo.bom.walk.roots import choose_assembly
 from silo.fcstd import Library
 
 

@@ -14,8 +14,8 @@ from freecad_cases.machines import REPOSITORY, FreeCAD
 from freecad_cases.truth import CONTROL
 
 from silo.bom.entry import BomEntry, Extraction
-from silo.bom.links import extract
-from silo.bom.roots import choose_assembly
+from silo.bom.walk.links import extract
+from silo.bom.walk.roots import choose_assembly
 from silo.fcstd import Library
 
 EXAMPLE = REPOSITORY / "examples" / "gearbox"

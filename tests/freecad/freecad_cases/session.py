@@ -21,8 +21,8 @@ import FreeCAD as App  # noqa: E402
 
 from silo.bom.entry import Extraction  # noqa: E402
 from silo.bom.errors import SiloError  # noqa: E402
-from silo.bom.links import extract  # noqa: E402
-from silo.bom.roots import choose_assembly  # noqa: E402
+from silo.bom.walk.links import extract  # noqa: E402
+from silo.bom.walk.roots import choose_assembly  # noqa: E402
 from silo.fcstd import Library  # noqa: E402
 from silo.workbench.freecad import host, live, saving  # noqa: E402
 from silo.workbench.freecad.opening import open_fully  # noqa: E402

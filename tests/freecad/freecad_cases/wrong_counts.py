@@ -21,8 +21,7 @@ import Part
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "mods"))
 
-from silo.bom import links, roles, roots, targets
-from silo.bom.walk import arrays, joints, kinds, tree
+from silo.bom.walk import arrays, joints, kinds, links, roles, roots, targets, tree
 from silo.workbench.freecad import host, live, witness
 
 

@@ -9,8 +9,8 @@ import pytest
 from fakes import Doc, edit
 
 from silo.bom.findings import FindingCode
-from silo.bom.links import file_item
 from silo.bom.walk.identity import sole_identity
+from silo.bom.walk.links import file_item
 from silo.workbench.documents.snapshot import Snapshot, take
 
 
@@ -52,8 +52,8 @@ def test_a_part_with_a_broken_link_is_no_part() -> None:
     """A missing file must never read as "no BOM"."""
     doc = Doc("/v/A.FCStd")
     doc.part("Model", doc.link("L", None))
-    from silo.bom.document import LinkProblem
-    from silo.bom.links import extract
+    from silo.bom.walk.document import LinkProblem
+    from silo.bom.walk.links import extract
 
     problem = LinkProblem(FindingCode.MISSING_FILE, "b.FCStd")
     taken = take(doc, walk=lambda obj: extract(obj, inspect=lambda obj: problem if obj.Name == "L" else None))

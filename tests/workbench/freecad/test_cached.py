@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from fakes import Doc, ForwardingLink, Obj
 
-from silo.bom.links import extract
+from silo.bom.walk.links import extract
 from silo.workbench.freecad.cached import CachedDocument, FactCache
 
 

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from fcstd_writer import Doc, locals_
 
-from silo.bom.links import extract
-from silo.bom.roots import choose_assembly
+from silo.bom.walk.links import extract
+from silo.bom.walk.roots import choose_assembly
 from silo.fcstd import Library, stamp, unstamp
 from silo.registering.candidate import Candidate, ComponentState, OpenedFile
 from silo.registering.carry_out import carry_out

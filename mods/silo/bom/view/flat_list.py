@@ -6,10 +6,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from silo.bom.document import relative
 from silo.bom.entry import BomEntry, Extraction, walk_entries
 from silo.bom.items.naming import display_name
 from silo.bom.view.folders import base_folder
+from silo.bom.walk.document import relative
 
 # A CAD model counts pieces.
 PIECES = "pcs"

@@ -6,8 +6,8 @@ from __future__ import annotations
 import os.path
 from types import ModuleType
 
-from silo.bom.document import relative
 from silo.bom.entry import Extraction
+from silo.bom.walk.document import relative
 
 
 def project_folder(path: str, top: str = "", rules: ModuleType = os.path) -> str:

@@ -6,11 +6,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from silo.bom.document import relative
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import InputError
 from silo.bom.findings import Finding
 from silo.bom.view.folders import base_folder, shorten
+from silo.bom.walk.document import relative
 
 # A line takes about 1 kB of memory on its way to JSON or to a terminal.
 MOST_LINES = 500_000

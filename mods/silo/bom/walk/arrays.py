@@ -6,8 +6,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from silo.bom.document import own
-from silo.bom.standard import millimetres
+from silo.bom.walk.document import own
+from silo.bom.walk.standard import millimetres
 
 
 def left_out_by(obj: Any) -> str:

@@ -25,9 +25,9 @@ def chains(count: Count, tree: Tree | None) -> Iterator[tuple[tuple[Any, int], .
 
 
 def _below(node: Contribution, wanted: Key) -> Iterator[tuple[tuple[Any, int], ...]]:
-    within = [(inner, times) for inner, times in node.below if wanted in inner.worth]
-    if not within or (node.kind is Kind.ASSEMBLY_LINK and wanted == next(iter(node.worth))):
-        yield ((node.obj, node.worth[wanted][1]),)
+    within = [(inner, times) for inner, times in node.shown_objects if wanted in inner.brings]
+    if not within or (node.kind is Kind.ASSEMBLY_LINK and wanted == next(iter(node.brings))):
+        yield ((node.obj, node.brings[wanted][1]),)
         return
     for inner, times in within:
         paths = node.tree.paths(inner.key) if node.tree is not None else [()]

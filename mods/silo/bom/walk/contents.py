@@ -61,8 +61,8 @@ class Contribution:
     key: Key
     obj: Any
     kind: Kind
-    worth: CountedObjects
-    below: tuple[tuple[Contribution, int], ...] = ()
+    brings: CountedObjects
+    shown_objects: tuple[tuple[Contribution, int], ...] = ()
     tree: Tree | None = None
 
 
@@ -73,7 +73,7 @@ class Count:
     shown
         that object, with what it shows.
     key
-        what identifies the component within ``shown.worth``.
+        what identifies the component within ``shown.brings``.
     link, array
         True if the object is itself an ``App::Link`` to a component of another file, and if that is an array.
     beside
@@ -90,7 +90,7 @@ class Count:
     @property
     def target(self) -> Any:
         """Return the component: a document object, or :class:`Lost`."""
-        return self.shown.worth[self.key][0]
+        return self.shown.brings[self.key][0]
 
 
 @dataclass(slots=True)

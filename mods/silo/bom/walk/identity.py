@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from uuid import UUID
 
-from silo.bom.document import document_property, object_name, own
+from silo.bom.walk.document import document_property, object_name, own
 
 META_KEY = "SiloUUID"
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from silo.bom.document import derived, object_name, own
+from silo.bom.walk.document import derived, object_name, own
 from silo.bom.walk.kinds import is_assembly3, members
 
 _JOINED = ("Reference1", "Reference2", "ObjectToGround", "Part1", "Part2")

@@ -12,8 +12,8 @@ from enum import Enum, auto
 from functools import lru_cache
 from typing import Any
 
-from silo.bom.document import derived, first_of, own, property_names
-from silo.bom.standard import fastener_type, is_tool
+from silo.bom.walk.document import derived, first_of, own, property_names
+from silo.bom.walk.standard import fastener_type, is_tool
 
 
 class Kind(Enum):

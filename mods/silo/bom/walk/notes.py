@@ -10,10 +10,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from silo.bom.document import DocumentRoot, LinkProblem, label_of, object_name, saved_by
 from silo.bom.entry import BomEntry
 from silo.bom.errors import DocumentError, listed
 from silo.bom.findings import Finding, FindingCode, Place, Severity
+from silo.bom.walk.document import DocumentRoot, LinkProblem, label_of, object_name, saved_by
 
 _Slot = tuple[FindingCode, str]
 

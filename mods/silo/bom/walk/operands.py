@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from typing import Any, TypeVar
 
-from silo.bom.document import derived, own
+from silo.bom.walk.document import derived, own
 
 T = TypeVar("T", bound=Hashable)
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Set
 from typing import Any
 
-from silo.bom.document import object_name, own
+from silo.bom.walk.document import object_name, own
 from silo.bom.walk.kinds import Kind, kind_of
 
 

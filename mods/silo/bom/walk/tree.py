@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from typing import Any, TypeVar
 
-from silo.bom.document import object_name, own
 from silo.bom.key import Key
 from silo.bom.walk.arrays import left_out_by
+from silo.bom.walk.document import object_name, own
 from silo.bom.walk.kinds import INLINE, Kind, kind_of, members
 
 T = TypeVar("T", bound=Hashable)

@@ -197,7 +197,7 @@ def moved(before: dict[str, set[str]], now: set[tuple[str, str]], base: str) -> 
     """Find the files that took over the identity of a file that is gone, or that has another item now: (name,
     before, now).
     """
-    from silo.bom.document import relative
+    from silo.bom.walk.document import relative
 
     here: dict[str, set[str]] = {}
     for uuid, path in now:

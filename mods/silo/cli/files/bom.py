@@ -10,13 +10,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from silo.bom.consolidation import consolidation_findings, one_hint_each
-from silo.bom.document import relative
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import BusyError, Exit, InputError
 from silo.bom.findings import FindingCode
 from silo.bom.view.flat_list import flat_json
 from silo.bom.view.folders import base_folder
 from silo.bom.view.tree_json import bom_json
+from silo.bom.walk.document import relative
 from silo.cli.connection import client_of, reach
 from silo.cli.files.bom_table import table_rows, write_csv, write_xlsx
 from silo.cli.files.bom_verify import verify
@@ -106,8 +106,8 @@ def run_bom(args: argparse.Namespace) -> int:
 
 def _why(args: argparse.Namespace) -> int:
     """Print each way from the assembly to a part, with the arrays on it."""
-    from silo.bom.links import why
-    from silo.bom.roots import choose_assembly
+    from silo.bom.walk.links import why
+    from silo.bom.walk.roots import choose_assembly
     from silo.cli.terminal import console, plain
     from silo.fcstd import Library
 

@@ -19,9 +19,9 @@ def verify(args: argparse.Namespace) -> int:
 
     It asks a FreeCAD that can open all files of the assembly, by the versions that saved them.
     """
-    from silo.bom.document import saved_by
-    from silo.bom.links import extract
-    from silo.bom.roots import choose_assembly
+    from silo.bom.walk.document import saved_by
+    from silo.bom.walk.links import extract
+    from silo.bom.walk.roots import choose_assembly
     from silo.fcstd import FcstdDocument, Library
     from silo.freecads.run import freecad_for, run_freecad
 

@@ -9,12 +9,12 @@ from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.compare.bom_diff import BomDiff
-from silo.bom.document import relative
 from silo.bom.errors import Exit
 from silo.bom.items.naming import display_name
 from silo.bom.view.diff_rows import diff_json
 from silo.bom.view.folders import base_folder
 from silo.bom.view.tree_json import finding_json
+from silo.bom.walk.document import relative
 from silo.cli.connection import client_of, reach
 from silo.cli.json_output import print_json
 from silo.cli.options import add_top

@@ -6,9 +6,9 @@ from __future__ import annotations
 import argparse
 import os
 
-from silo.bom.document import relative
 from silo.bom.entry import walk_entries
 from silo.bom.errors import DocumentError, Exit, InputError, SiloError, counted
+from silo.bom.walk.document import relative
 from silo.cli.json_output import print_json
 from silo.cli.options import add_each
 from silo.cli.reading import read_assembly

@@ -7,8 +7,8 @@ import argparse
 import os
 from collections.abc import Mapping
 
-from silo.bom.document import relative
 from silo.bom.errors import Exit, InputError, did_you_mean
+from silo.bom.walk.document import relative
 from silo.cli.json_output import print_json
 from silo.cli.options import add_each
 from silo.cli.progress import count_steps

@@ -14,10 +14,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from silo.bom.document import relative
 from silo.bom.entry import Extraction, walk_entries
 from silo.bom.errors import Exit, InputError
 from silo.bom.view.folders import base_folder
+from silo.bom.walk.document import relative
 from silo.cli.connection import client_of
 from silo.cli.options import add_options, add_top, not_with, only_with
 from silo.cli.reading import plan_of, read_tops

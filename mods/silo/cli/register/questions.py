@@ -12,8 +12,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from silo.bom.document import relative
 from silo.bom.errors import InputError, SiloError
+from silo.bom.walk.document import relative
 from silo.cli.progress import set_step
 from silo.cli.terminal import plain
 from silo.registering.candidate import Candidate, CandidateFiles, ComponentState

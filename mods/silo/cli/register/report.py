@@ -8,7 +8,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from silo.bom.document import relative
+from silo.bom.walk.document import relative
 from silo.cli.json_output import print_json
 from silo.cli.terminal import console, plain
 

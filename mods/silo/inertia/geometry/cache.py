@@ -20,8 +20,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from silo.bom.document import relative
 from silo.bom.errors import InputError
+from silo.bom.walk.document import relative
 from silo.checksums import content_hash
 from silo.inertia.assembly import Assembly
 from silo.inertia.geometry.options import ReadOptions

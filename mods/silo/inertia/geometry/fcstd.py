@@ -21,8 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from silo.bom.document import LinkProblem
 from silo.bom.errors import DocumentError
+from silo.bom.walk.document import LinkProblem
 from silo.fcstd import Library
 from silo.inertia.geometry.freecad import (
     NOTHING,

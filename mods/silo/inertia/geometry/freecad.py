@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""From FreeCAD objects to products and their uses: the chains of :mod:`silo.bom.roles`, with placements.
+"""From FreeCAD objects to products and their uses: the chains of :mod:`silo.bom.walk.roles`, with placements.
 
 Nothing here decides what counts. How FreeCAD places things (``src/App/Link.cpp``, tried with 0.20 and 1.0):
 
@@ -24,18 +24,18 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from silo.bom.document import LinkProblem, derived, first_of, label_of, object_name, own, relative
 from silo.bom.entry import BomEntry
 from silo.bom.errors import DocumentError, InputError, listed
 from silo.bom.findings import FindingCode
 from silo.bom.items.naming import display_name
 from silo.bom.key import Key
-from silo.bom.roots import choose_assembly, seen_beside, silent_reader
-from silo.bom.standard import STANDARD_PARTS
-from silo.bom.targets import Step, is_assembly_link, is_link
 from silo.bom.walk.arrays import elements, left_out_by
 from silo.bom.walk.contents import Contents, Contribution, Count, Lost
+from silo.bom.walk.document import LinkProblem, derived, first_of, label_of, object_name, own, relative
 from silo.bom.walk.kinds import REPEATERS, Kind, is_container, is_named_assembly, kind_of
+from silo.bom.walk.roots import choose_assembly, seen_beside, silent_reader
+from silo.bom.walk.standard import STANDARD_PARTS
+from silo.bom.walk.targets import Step, is_assembly_link, is_link
 from silo.inertia.assembly import Assembly, Prototype
 from silo.inertia.geometry import measured as checks
 from silo.inertia.geometry.graph import MAX_DEPTH, Child, Floats, Node, in_metres, unfold
@@ -378,9 +378,9 @@ class Walk:
             return
         outer = self.facts.placement(obj) if with_place else np.eye(4)
         outer = outer if moved is None else moved
-        below = [inner for inner, _ in node.below if key in inner.worth]
+        below = [inner for inner, _ in node.shown_objects if key in inner.brings]
         if not below:
-            yield node.worth[key][0], None, outer
+            yield node.brings[key][0], None, outer
         elif node.tree is not None:
             for inner in below:
                 for path in node.tree.paths(inner.key):
@@ -408,7 +408,7 @@ class Walk:
     ) -> Iterator[_Placed]:
         obj = node.obj
         if self._is_one_shape(obj):
-            if key == next(iter(node.worth)):  # it holds all that the array shows
+            if key == next(iter(node.brings)):  # it holds all that the array shows
                 yield obj, obj, outer
             return
         places = self.facts.places(obj)
@@ -426,13 +426,13 @@ class Walk:
         target = self._reader.resolve(node.obj)
         steps = target.way or (Step(node.obj),)
         around = self._along(steps, with_place, moved)
-        below = [inner for inner, _ in node.below if key in inner.worth]
+        below = [inner for inner, _ in node.shown_objects if key in inner.brings]
         last = steps[-1].obj
         is_placed = own(last, "LinkTransform") is True if target.by_link else bool(target.way)
         if target.variant is not None or not below:
             end = target.obj if target.variant is None else target.variant
             if end is None:
-                end = node.worth[key][0]
+                end = node.brings[key][0]
             elif is_placed:
                 around = [place @ self.facts.placement(end) for place in around]
             flexible = is_assembly_link(last) and own(last, "Rigid") is False

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from silo.bom.document import saved_by
+from silo.bom.walk.document import saved_by
 from silo.workbench.activity.box import PaneEntry, own_box
 from silo.workbench.tone import Tone
 from silo.workbench.words import translate

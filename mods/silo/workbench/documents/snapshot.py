@@ -13,10 +13,10 @@ from typing import Any
 
 from silo.bom.entry import Extraction
 from silo.bom.errors import SeveralAssembliesError
-from silo.bom.links import extract, file_bom
-from silo.bom.roots import NAME_ONE
 from silo.bom.snapshot import to_plain
 from silo.bom.walk.identity import held_items, sole_identity
+from silo.bom.walk.links import extract, file_bom
+from silo.bom.walk.roots import NAME_ONE
 from silo.platform import one_path
 from silo.workbench.words import translate
 

@@ -12,8 +12,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from silo.bom.document import LinkProblem
 from silo.bom.findings import FindingCode
+from silo.bom.walk.document import LinkProblem
 
 # Attributes of an object that are no properties, and that a walk may ask for.
 _PLAIN = frozenset(("State", "ID", "dumpPropertyContent", "getLinkedObject", "isValid"))
@@ -67,7 +67,7 @@ class FactCache:
 
 
 class CachedObject:
-    """A document object as :class:`silo.bom.document.ObjectLike` has it; ``real`` is FreeCAD's."""
+    """A document object as :class:`silo.bom.walk.document.ObjectLike` has it; ``real`` is FreeCAD's."""
 
     def __init__(self, real: Any, cache: FactCache) -> None:
         fields = self.__dict__
@@ -103,7 +103,7 @@ class CachedObject:
 
 
 class CachedDocument:
-    """A document as :class:`silo.bom.document.DocumentLike` has it."""
+    """A document as :class:`silo.bom.walk.document.DocumentLike` has it."""
 
     def __init__(self, real: Any, cache: FactCache) -> None:
         self.real = real

@@ -14,14 +14,14 @@ import zlib
 from collections.abc import Callable, Collection
 from typing import Any
 
-from silo.bom.document import LinkProblem, object_name
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import DocumentError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.key import Key
-from silo.bom.links import extract, why
-from silo.bom.roots import choose_assembly
-from silo.bom.targets import is_assembly_link, is_link
+from silo.bom.walk.document import LinkProblem, object_name
+from silo.bom.walk.links import extract, why
+from silo.bom.walk.roots import choose_assembly
+from silo.bom.walk.targets import is_assembly_link, is_link
 from silo.platform import Spelling, one_path
 from silo.workbench.freecad import host
 from silo.workbench.freecad.cached import CachedDocument, FactCache
@@ -112,7 +112,10 @@ def extract_object(assembly_obj: Any, *, hardware: bool = True) -> Extraction:
 
 
 def why_object(document: Any, assembly: str, parts: Collection[Key], *, hardware: bool = True) -> list[str]:
-    """Say why an assembly of an open document has this quantity of a part; see :func:`silo.bom.links.why`."""
+    """Say why an assembly of an open document has this quantity of a part.
+
+    See :func:`silo.bom.walk.links.why`.
+    """
     cached = cached_document(document)
     top = cached.getObject(assembly) if assembly else choose_assembly(cached)
     if top is None:

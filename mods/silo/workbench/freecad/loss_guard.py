@@ -9,8 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from silo.bom.document import saved_by
 from silo.bom.errors import SiloError
+from silo.bom.walk.document import saved_by
 from silo.outbox.store import KEPT_ASIDE_DAYS
 from silo.platform import replacing
 from silo.workbench.activity.box import PaneEntry, own_box

@@ -38,7 +38,7 @@ def refuse_loss(doc: Any) -> None:
 
 
 def _is_ours(program: str) -> bool:
-    from silo.bom.document import saved_by  # late: FreeCAD's start waits for this module
+    from silo.bom.walk.document import saved_by  # late: FreeCAD's start waits for this module
 
     by = saved_by(program)
     return bool(by) and by[:2] <= host.version()

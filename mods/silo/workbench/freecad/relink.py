@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from silo.bom.document import LinkProblem, located
 from silo.bom.errors import DocumentError
 from silo.bom.findings import Finding
+from silo.bom.walk.document import LinkProblem, located
 from silo.workbench.freecad import host, live
 from silo.workbench.freecad.opening import open_fully
 from silo.workbench.freecad.stored_links import stored_sub_name

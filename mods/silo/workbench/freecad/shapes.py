@@ -21,8 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from silo.bom.document import LinkProblem, own
 from silo.bom.errors import DocumentError
+from silo.bom.walk.document import LinkProblem, own
 from silo.inertia.assembly import Assembly, SolidProps
 from silo.inertia.geometry.exact import (
     Basis,

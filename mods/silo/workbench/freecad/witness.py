@@ -13,14 +13,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from silo.bom.document import object_name
 from silo.bom.entry import BomEntry, Extraction, walk_entries
 from silo.bom.key import Key
-from silo.bom.roots import choose_assembly, fates, silent_reader
-from silo.bom.standard import STANDARD_PARTS
 from silo.bom.walk.chains import chains
 from silo.bom.walk.contents import Count, Lost, ObjectRole
+from silo.bom.walk.document import object_name
 from silo.bom.walk.kinds import COMPONENTS, REPEATERS, Kind, kind_of
+from silo.bom.walk.roots import choose_assembly, fates, silent_reader
+from silo.bom.walk.standard import STANDARD_PARTS
 from silo.bom.walk.tree import Tree
 from silo.workbench.freecad import host
 from silo.workbench.freecad.live import LinkInspector, cached_document, canonical_paths

@@ -10,11 +10,11 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.compare.bom_diff import BomDiff
-from silo.bom.document import relative
 from silo.bom.entry import BomEntry
 from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.items.naming import display_name
 from silo.bom.view.folders import shorten
+from silo.bom.walk.document import relative
 from silo.workbench.preview.comparison import Compared, Preview
 from silo.workbench.words import MOST_TIP, counted, plain, quantity, spoken, translate
 

@@ -19,8 +19,8 @@ from OCP.BRepTools import BRepTools
 from OCP.gp import gp_Pnt
 
 from silo.bom.errors import DocumentError
-from silo.bom.links import extract
-from silo.bom.roots import choose_assembly
+from silo.bom.walk.links import extract
+from silo.bom.walk.roots import choose_assembly
 from silo.fcstd import Library
 from silo.inertia.assembly import Assembly
 from silo.inertia.geometry import ReadOptions, read

@@ -24,22 +24,12 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
-from silo.bom.document import LinkProblem, first_of, label_of, located, object_name, own, same_document
 from silo.bom.errors import DocumentError
 from silo.bom.findings import FindingCode
 from silo.bom.key import Key
-from silo.bom.standard import STANDARD_PARTS, designation
-from silo.bom.targets import (
-    Inspect,
-    Target,
-    is_assembly_link,
-    is_link,
-    own_parts,
-    resolve_target,
-    stale_copies,
-)
 from silo.bom.walk.arrays import draft_count, elements, is_array, left_out_by
 from silo.bom.walk.contents import Contents, Contribution, Count, CountedObjects, Lost, ObjectRole, add
+from silo.bom.walk.document import LinkProblem, first_of, label_of, located, object_name, own, same_document
 from silo.bom.walk.identity import document_identity, identity_of, own_identity
 from silo.bom.walk.kinds import (
     COMPONENTS,
@@ -53,7 +43,17 @@ from silo.bom.walk.kinds import (
 )
 from silo.bom.walk.notes import Notes
 from silo.bom.walk.operands import consumed
+from silo.bom.walk.standard import STANDARD_PARTS, designation
 from silo.bom.walk.survey import survey_of
+from silo.bom.walk.targets import (
+    Inspect,
+    Target,
+    is_assembly_link,
+    is_link,
+    own_parts,
+    resolve_target,
+    stale_copies,
+)
 from silo.bom.walk.tree import Tree
 
 # Groups that link to groups: no file needs many of these, but an attack does.
@@ -227,7 +227,7 @@ class Reading:
         top, kind = self._key(container), kind_of(container)
         if kind in REPEATERS:
             node = self._node(top, container, kind)
-            leaves = [(node, 1)] if node is not None and node.worth else []
+            leaves = [(node, 1)] if node is not None and node.brings else []
             counts, mine = self._split(leaves)
             mine = [count for count in mine if count.target is not container]
             return Contents(counts, mine, {top: ObjectRole.COMPONENT}, self._holds_components or bool(counts))
@@ -426,7 +426,7 @@ class Reading:
         if any(outer in self._shown and not tree.visible(outer) for outer in around):
             return ObjectRole.SOURCE, None
         node = self._node(name, obj, kind)
-        if node is None or not node.worth:
+        if node is None or not node.brings:
             return ObjectRole.CONSTRUCTION, None
         return self._unconsumed(tree, name, node)
 
@@ -440,7 +440,7 @@ class Reading:
         self, tree: Tree, name: Key, node: Contribution
     ) -> tuple[ObjectRole, Contribution | None]:
         """Leave out standard parts and geometry that a feature consumes; a part of another file stays."""
-        if all(key[0] != STANDARD_PARTS and key[0] != self._path for key in node.worth):
+        if all(key[0] != STANDARD_PARTS and key[0] != self._path for key in node.brings):
             return ObjectRole.COMPONENT, node
         if len(tree.members) < 2 and not self._is_hardware(node):  # to ask every feature takes long
             return ObjectRole.COMPONENT, node
@@ -453,16 +453,18 @@ class Reading:
             self._notes.add(FindingCode.CONSUMED, node.obj, target=feature)
         remaining = {
             key: owner
-            for key, owner in node.worth.items()
+            for key, owner in node.brings.items()
             if key[0] != STANDARD_PARTS and not (key[0] == self._path and self._is_own(owner[0]))
         }
         if not remaining:
             return ObjectRole.OPERAND, None
-        return ObjectRole.COMPONENT, Contribution(name, node.obj, node.kind, remaining, node.below, node.tree)
+        return ObjectRole.COMPONENT, Contribution(
+            name, node.obj, node.kind, remaining, node.shown_objects, node.tree
+        )
 
     @staticmethod
     def _is_hardware(node: Contribution) -> bool:
-        return any(key[0] == STANDARD_PARTS for key in node.worth)
+        return any(key[0] == STANDARD_PARTS for key in node.brings)
 
     def _without_hidden_geometry(
         self, tree: Tree, leaves: list[tuple[Contribution, int]]
@@ -473,7 +475,7 @@ class Reading:
         for node, _ in leaves:
             if node.kind not in DECLARABLE or tree.visible(node.key):
                 continue
-            if all(key[0] == self._path and self._is_own(target) for key, (target, _) in node.worth.items()):
+            if all(key[0] == self._path and self._is_own(target) for key, (target, _) in node.brings.items()):
                 hidden.add(node.key)
         if not hidden or len(hidden) == len(leaves):
             return leaves
@@ -489,7 +491,7 @@ class Reading:
         mine: list[Count] = []
         for node, times in leaves:
             link = node.key in self._links
-            for key, (target, quantity) in node.worth.items():
+            for key, (target, quantity) in node.brings.items():
                 count = Count(node, key, quantity * times, link, link and is_array(node.obj), beside)
                 is_mine = key[0] == self._path and self._is_own(target)
                 (mine if is_mine else counts).append(count)
@@ -499,7 +501,7 @@ class Reading:
         """Report links that lead back to their holder, unless they bring nothing anyway."""
         for ring in self._rings:
             links = [obj for obj in ring.values() if is_link(obj)]
-            if not links or any(key in self._nodes and self._nodes[key].worth for key in ring):
+            if not links or any(key in self._nodes and self._nodes[key].brings for key in ring):
                 for obj in ring.values():
                     self._notes.loop(obj)
                 continue
@@ -560,10 +562,10 @@ class Reading:
 
     @staticmethod
     def _sum(leaves: Iterable[tuple[Contribution, int]]) -> CountedObjects:
-        worth: CountedObjects = {}
+        brings: CountedObjects = {}
         for node, times in leaves:
-            add(worth, node.worth, times)
-        return worth
+            add(brings, node.brings, times)
+        return brings
 
     def _standard(self, fastener: Any) -> CountedObjects:
         if not self._reader.hardware:
@@ -595,20 +597,20 @@ class Reading:
         listed = sources(obj)
         shown = [member for member in listed if not self._is_left_out(member)]
         nodes = [self._node(self._key(member), member, kind_of(member)) for member in shown]
-        below = [(node, 1) for node in nodes if node is not None and node.worth]
-        worth = self._sum(below)
-        one_piece = kind is Kind.COMPOUND and bool(worth) and self._is_geometry(obj, kind)
-        if not listed or (one_piece and all(self._is_own(target) for target, _ in worth.values())):
+        shown_objects = [(node, 1) for node in nodes if node is not None and node.brings]
+        brings = self._sum(shown_objects)
+        one_piece = kind is Kind.COMPOUND and bool(brings) and self._is_geometry(obj, kind)
+        if not listed or (one_piece and all(self._is_own(target) for target, _ in brings.values())):
             return Contribution(key, obj, kind, {key: (obj, 1)})
-        if not worth or kind is not Kind.DRAFT_ARRAY:
-            return Contribution(key, obj, kind, worth, tuple(below))
+        if not brings or kind is not Kind.DRAFT_ARRAY:
+            return Contribution(key, obj, kind, brings, tuple(shown_objects))
         count = draft_count(obj)
         if count is None:
             self._notes.add(FindingCode.ARRAY_SIZE, obj, target=shown[0])
-        elif not all(self._is_own(target) for target, _ in worth.values()):
+        elif not all(self._is_own(target) for target, _ in brings.values()):
             self._notes.add(FindingCode.DRAFT_ARRAY, obj, target=shown[0], count=count)
-        below = [(node, count or 1) for node, _ in below]
-        return Contribution(key, obj, kind, self._sum(below), tuple(below))
+        shown_objects = [(node, count or 1) for node, _ in shown_objects]
+        return Contribution(key, obj, kind, self._sum(shown_objects), tuple(shown_objects))
 
     def _is_left_out(self, obj: Any) -> bool:
         """Return True if an object is left out, and note that."""
@@ -663,39 +665,39 @@ class Reading:
         # An object of another file is a component, whatever it is.
         text, _ = self._reader.standard(target.obj, name)
         if text:
-            worth = self._standard(target.obj)
+            brings = self._standard(target.obj)
         else:
-            worth = self._ones.setdefault(name, {name: (target.obj, 1)})
-        if not worth:
-            return Contribution(key, link, kind, worth)
+            brings = self._ones.setdefault(name, {name: (target.obj, 1)})
+        if not brings:
+            return Contribution(key, link, kind, brings)
         if is_link(link):
             self._links.add(key)
             self._notes.link_type(link)
         self._remarks(link, target)
         if target.instances != 1:
-            worth = {brought: (obj, count * target.instances) for brought, (obj, count) in worth.items()}
+            brings = {brought: (obj, count * target.instances) for brought, (obj, count) in brings.items()}
         if not is_assembly_link(link):
-            return Contribution(key, link, kind, worth)
+            return Contribution(key, link, kind, brings)
         parts = own_parts(link, target.obj, self._key)
         nodes = [self._node(self._key(part), part, kind_of(part)) for part in parts]
-        below = [(node, 1) for node in nodes if node is not None]
-        worth = dict(worth)
-        add(worth, self._sum(below))
-        return Contribution(key, link, kind, worth, tuple(below))
+        shown_objects = [(node, 1) for node in nodes if node is not None]
+        brings = dict(brings)
+        add(brings, self._sum(shown_objects))
+        return Contribution(key, link, kind, brings, tuple(shown_objects))
 
     def _in_document(self, key: Key, link: Any, kind: Kind, target: Target) -> Contribution:
         """Return what a link within the file brings: the same as its target, which may be nothing."""
         obj = target.obj
         node = self._node(self._key(obj), obj, kind_of(obj))
-        below = ((node, target.instances),) if node is not None and node.worth else ()
-        if not below:
+        shown_objects = ((node, target.instances),) if node is not None and node.brings else ()
+        if not shown_objects:
             if not any(key in ring for ring in self._rings):
                 self._notes.in_document(link, obj)
         elif target.mirrored:
             self._notes.add(FindingCode.MIRRORED, link, target=obj)
-        if below and target.variant is not None:
+        if shown_objects and target.variant is not None:
             self._notes.add(FindingCode.VARIANT, link, target=obj)
-        return Contribution(key, link, kind, self._sum(below), below)
+        return Contribution(key, link, kind, self._sum(shown_objects), shown_objects)
 
     def _remarks(self, link: Any, target: Target) -> None:
         if target.mirrored:

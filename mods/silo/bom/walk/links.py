@@ -8,7 +8,7 @@ The rules of this module:
 * an assembly inside itself is cut where it closes the ring, and reported as a cycle;
 * whatever is not counted has a finding.
 
-What one assembly holds is read by :mod:`silo.bom.roles`, each once; this module puts the levels
+What one assembly holds is read by :mod:`silo.bom.walk.roles`, each once; this module puts the levels
 together. It walks live FreeCAD objects, objects read from FCStd files and the tests' fakes alike.
 """
 
@@ -19,22 +19,22 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from silo.bom.document import NAMELESS, label_of, own
 from silo.bom.entry import BomEntry, Extraction, walk_entries
 from silo.bom.errors import InputError, SeveralAssembliesError, did_you_mean
 from silo.bom.findings import Finding, FindingCode, Place
 from silo.bom.items.naming import display_name
 from silo.bom.key import Key
-from silo.bom.roles import Canonical, Files
-from silo.bom.roots import Whole, as_it_is, beside, choose_assembly, fates, silent_reader
-from silo.bom.standard import same_articles, standard_uuid
-from silo.bom.targets import Inspect, resolve_target
 from silo.bom.walk.chains import chains
 from silo.bom.walk.contents import Count, Lost
+from silo.bom.walk.document import NAMELESS, label_of, own
 from silo.bom.walk.identity import identity_of, sole_identity
 from silo.bom.walk.joints import held_by_joints, is_attached
 from silo.bom.walk.kinds import Kind, is_container, is_named_assembly
+from silo.bom.walk.roles import Canonical, Files
+from silo.bom.walk.roots import Whole, as_it_is, beside, choose_assembly, fates, silent_reader
 from silo.bom.walk.shared_identity import identity_findings
+from silo.bom.walk.standard import same_articles, standard_uuid
+from silo.bom.walk.targets import Inspect, resolve_target
 
 # Real assemblies are some ten levels deep; deeper is an attack or a loop that no other guard saw.
 MAX_LEVELS = 64
@@ -101,7 +101,7 @@ def extract(
     """Walk an assembly.
 
     inspect
-        says what is wrong with a live object (see :func:`silo.bom.targets.resolve_target`); links read
+        says what is wrong with a live object (see :func:`silo.bom.walk.targets.resolve_target`); links read
         from FCStd files know it themselves.
     canonical
         makes one path of the several paths that a file may have (``os.path.realpath`` for live documents).

@@ -11,7 +11,9 @@ from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from silo.bom.document import (
+from silo.bom.findings import FindingCode
+from silo.bom.walk.arrays import array_count, elements, is_array
+from silo.bom.walk.document import (
     LinkProblem,
     derived,
     first_of,
@@ -23,8 +25,6 @@ from silo.bom.document import (
     same_document,
     split_sub_name,
 )
-from silo.bom.findings import FindingCode
-from silo.bom.walk.arrays import array_count, elements, is_array
 from silo.bom.walk.kinds import COMPONENTS, Kind, kind_of
 
 Inspect = Callable[[Any], "LinkProblem | None"]

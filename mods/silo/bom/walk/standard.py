@@ -18,7 +18,7 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
-from silo.bom.document import derived, own, property_names
+from silo.bom.walk.document import derived, own, property_names
 
 # The namespace of standard parts; it never changes, or every screw would become a new item.
 NAMESPACE = uuid.UUID("5d8d3a1e-6f0b-5c7a-9a54-2f1d7c0e4b36")

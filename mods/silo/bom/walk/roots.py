@@ -12,12 +12,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
-from silo.bom.document import DocumentRoot, derived, first_of, label_of, object_name, own, same_document
 from silo.bom.errors import InputError, SeveralAssembliesError
-from silo.bom.roles import SHOWING, Files, Reader, Reading
-from silo.bom.targets import Inspect, is_assembly_link
 from silo.bom.walk.arrays import elements, left_out_by
 from silo.bom.walk.contents import Contents, Lost, ObjectRole
+from silo.bom.walk.document import DocumentRoot, derived, first_of, label_of, object_name, own, same_document
 from silo.bom.walk.kinds import (
     COMPONENTS,
     INLINE,
@@ -29,7 +27,9 @@ from silo.bom.walk.kinds import (
     members,
 )
 from silo.bom.walk.operands import consumed
+from silo.bom.walk.roles import SHOWING, Files, Reader, Reading
 from silo.bom.walk.survey import Survey, survey_of
+from silo.bom.walk.targets import Inspect, is_assembly_link
 from silo.bom.walk.tree import COPIES, climbed, is_switched_on
 
 # What to do if a document holds several assemblies. The window says it in its own words.
