@@ -46,8 +46,9 @@ from silo_server.db import tables
 from silo_server.db.database import Database
 from silo_server.db.rows import insert_rows
 from silo_server.run import prepare, running_server, share_the_processor
-from silo_server.services.bom.summary import keep_all, keep_summaries, summary_of
 from silo_server.services.items import get_item
+from silo_server.services.product.summary_keep import keep_all, keep_summaries
+from silo_server.services.product.summary_read import summary_of
 from silo_server.settings import Settings
 
 TOKEN = "silo_scale_0123456789abcdef"

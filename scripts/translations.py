@@ -333,7 +333,7 @@ String should have at most {n} characters|String should have at least {n} charac
 _WITHOUT = re.compile(
     r"silo/(workbench/(gui|pane|preview|register|smoke|headless|settings/preferences)|drawing/page|"
     r"testing\.py|cli/json_schemas\.py|bom/headers\.py|bom/walk/standard\.py|api/wire\.py|"
-    r"fcstd/properties\.py)|silo_server/services/bom/(frozen|transfer)\.py"
+    r"fcstd/properties\.py)|silo_server/services/product/(frozen|export|export_files)\.py"
 )
 # No text for people.
 _NO_TEXT = re.compile(

@@ -16,8 +16,8 @@ from silo.bom.errors import SiloError
 from silo_server.db.database import Database
 from silo_server.errors import cause_of
 from silo_server.services.access.tokens import note_token_uses
-from silo_server.services.bom.summary import keep_summaries
 from silo_server.services.looks import keep_looks
+from silo_server.services.product.summary_keep import keep_summaries
 
 logger = logging.getLogger("silo_server.housekeeping")
 

@@ -32,13 +32,13 @@ from silo_server.db.database import Database
 from silo_server.errors import DuplicateError
 from silo_server.run import prepare
 from silo_server.services.bom import history
+from silo_server.services.bom.conflicts import open_conflicts
 from silo_server.services.bom.decisions import Decision, ReviewAction, resolve
 from silo_server.services.bom.line_edit import add_line, change_line, remove_line
 from silo_server.services.bom.lines import lines_of
 from silo_server.services.bom.merge import merge_bom, preview_merge
 from silo_server.services.bom.merge_request import read_merge_request
 from silo_server.services.bom.restore import restore_bom, undo_change
-from silo_server.services.bom.review import open_conflicts
 from silo_server.services.items import NewItem, create_item, get_item
 from silo_server.settings import Settings
 from silo_server.values import LineState

@@ -37,10 +37,10 @@ from silo_server.services.bom.line_edit import add_line, change_line
 from silo_server.services.bom.line_state import state_columns
 from silo_server.services.bom.merge import merge_bom
 from silo_server.services.bom.merge_request import read_merge_request
-from silo_server.services.bom.summary import keep_all
 from silo_server.services.bom.waiting import waiting, waiting_count
 from silo_server.services.items import NewItem, archive_item, create_item, get_item
 from silo_server.services.product.graph import load_graph
+from silo_server.services.product.summary_keep import keep_all
 from silo_server.services.product.tree import expand
 from silo_server.services.product.where_used import where_used
 from silo_server.settings import Settings

@@ -24,8 +24,9 @@ from silo_server.db.turnstile import Turnstile
 from silo_server.routes.call import Call, Server
 from silo_server.routes.made_files import file_of
 from silo_server.run import RunningServer, running_server
-from silo_server.services.bom.transfer import Export, Row, View, to_csv, to_json, to_xlsx
 from silo_server.services.items import get_item
+from silo_server.services.product.export import Export, Row, View
+from silo_server.services.product.export_files import to_csv, to_json, to_xlsx
 
 ITEM = "/api/items/{number}"
 LARGE = [

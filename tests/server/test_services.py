@@ -38,9 +38,9 @@ from silo_server.services.access.users import create_user
 from silo_server.services.bom.line_edit import check_state, edited_state
 from silo_server.services.bom.line_state import state_to_json, stored_state
 from silo_server.services.bom.merge_request import read_merge_request
-from silo_server.services.bom.transfer import _numbered
 from silo_server.services.field_checks import quantity_problem
 from silo_server.services.items import NewItem, create_item
+from silo_server.services.product.export import _numbered
 from silo_server.services.product.parts import positive_number
 from silo_server.times import stamp, utc_now, wire_time
 from silo_server.user_json import dumps

@@ -28,24 +28,13 @@ from silo_server.db.tables import items, product_summaries
 from silo_server.db.transaction import Tx
 from silo_server.events import log
 from silo_server.run import prepare
-from silo_server.services.bom import history, transfer
+from silo_server.services.bom import history
 from silo_server.services.bom.decisions import Decision, ReviewAction, resolve
 from silo_server.services.bom.last_sync import record_refusal
 from silo_server.services.bom.line_edit import add_line, change_line
 from silo_server.services.bom.merge import merge_bom
 from silo_server.services.bom.merge_request import read_merge_request
 from silo_server.services.bom.restore import undo_change
-from silo_server.services.bom.summary import (
-    LONGEST_CHANGE,
-    MOST_NAMED,
-    Summary,
-    keep_all,
-    keep_summaries,
-    marks_of,
-    standing_alone,
-    summaries,
-    summary_of,
-)
 from silo_server.services.items import (
     ItemChange,
     NewItem,
@@ -58,10 +47,15 @@ from silo_server.services.items import (
     unarchive_item,
 )
 from silo_server.services.product import parts as product_parts
+from silo_server.services.product.export import View, export
 from silo_server.services.product.flat import flatten
 from silo_server.services.product.graph import MAX_DEPTH, load_graph
 from silo_server.services.product.parts import parts_of
 from silo_server.services.product.rollup import roll_up_cost, roll_up_mass
+from silo_server.services.product.summary import Summary
+from silo_server.services.product.summary_keep import LONGEST_CHANGE, keep_all, keep_summaries
+from silo_server.services.product.summary_make import MOST_NAMED
+from silo_server.services.product.summary_read import marks_of, standing_alone, summaries, summary_of
 from silo_server.services.product.tree import expand
 from silo_server.settings import Settings
 from silo_server.values import LineState
@@ -340,7 +334,7 @@ def test_a_list_marks_what_is_open_in_products(db: Database, monkeypatch: pytest
     assert told[numbers[2]] == ["never synced"]
     assert parts[0] not in told
     db.built.clear()
-    monkeypatch.setattr("silo_server.services.bom.summary.MOST_FOR_A_LIST", 2)
+    monkeypatch.setattr("silo_server.services.product.summary_read.MOST_FOR_A_LIST", 2)
     assert marks() == {}
     keep_summaries(db)
     assert marks() == told
@@ -403,9 +397,9 @@ def test_a_deep_product_with_many_unknown_masses(db: Database) -> None:
     assert list(told.mass_missing) == sorted(parts)[:MOST_NAMED]
 
 
-@pytest.mark.parametrize("view", list(transfer.View))
+@pytest.mark.parametrize("view", list(View))
 def test_an_export_reads_its_parts_some_at_a_time(
-    db: Database, monkeypatch: pytest.MonkeyPatch, view: transfer.View
+    db: Database, monkeypatch: pytest.MonkeyPatch, view: View
 ) -> None:
     """However many at a time, the rows are the same: with a filter, and with what the syncs left out."""
     top, sub, *_, first, second = seed(db)
@@ -417,20 +411,20 @@ def test_an_export_reads_its_parts_some_at_a_time(
 
     def rows(words: str) -> list[dict[str, Any]]:
         with db.read() as tx:
-            return list(transfer.export(tx, top, view, 2, words).rows)
+            return list(export(tx, top, view, 2, words).rows)
 
     whole, found = rows(""), rows("misumi")
     numbers = [row.get("Part number") for row in whole]
     deep = {
-        transfer.View.SINGLE: [sub, second],
-        transfer.View.INDENTED: [sub, first, second, second, None],
-        transfer.View.FLAT: [second, first, None],
+        View.SINGLE: [sub, second],
+        View.INDENTED: [sub, first, second, second, None],
+        View.FLAT: [second, first, None],
     }
     assert numbers == deep[view]
     assert [row["Part number"] for row in found] == {
-        transfer.View.SINGLE: [sub],
-        transfer.View.INDENTED: [sub, first],
-        transfer.View.FLAT: [first],
+        View.SINGLE: [sub],
+        View.INDENTED: [sub, first],
+        View.FLAT: [first],
     }[view]
     monkeypatch.setattr(product_parts, "PORTION", 1)
     assert (rows(""), rows("misumi")) == (whole, found)

@@ -283,7 +283,7 @@ bom_last_syncs = Table(
     Index("ix_bom_last_syncs_open", "parent_id", **only(INCOMPLETE)),
 )
 
-# What services.bom.summary keeps of each assembly: no foreign key, so that keeping waits for no item.
+# What services.product keeps of each assembly: no foreign key, so that keeping waits for no item.
 product_summaries = Table(
     "product_summaries",
     metadata,

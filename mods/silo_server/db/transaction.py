@@ -43,7 +43,7 @@ class Tx:
     ends_access: bool = False
     # UUIDs of items that changed without an event.
     touched: set[str] = field(default_factory=set)
-    # Where a read leaves the summaries that it made (services.bom.summary); a change leaves none.
+    # Where a read leaves the summaries that it made (services.product.summary_make); a change leaves none.
     built: deque[Any] | None = None
 
     @property

@@ -13,7 +13,7 @@ from starlette.responses import Response, StreamingResponse
 
 from silo_server.db.transaction import Tx
 from silo_server.routes.call import Call
-from silo_server.services.bom import transfer
+from silo_server.services.product.export import Export, Row
 
 SPOOL_BYTES = 1024 * 1024
 CHUNK = 64 * 1024
@@ -39,7 +39,7 @@ class _Spool(SpooledTemporaryFile[bytes]):
         return super().write(data)
 
 
-def _while(check: Callable[[], object], rows: Iterable[transfer.Row]) -> Iterator[transfer.Row]:
+def _while(check: Callable[[], object], rows: Iterable[Row]) -> Iterator[Row]:
     for row in rows:
         check()
         yield row
@@ -53,8 +53,8 @@ def _sent(out: IO[bytes]) -> Iterator[bytes]:
 
 def file_of(
     call: Call,
-    make: Callable[[Tx], transfer.Export],
-    write: Callable[[transfer.Export, IO[bytes]], Callable[[], None] | None],
+    make: Callable[[Tx], Export],
+    write: Callable[[Export, IO[bytes]], Callable[[], None] | None],
     media_type: str,
     name: str,
 ) -> Response:

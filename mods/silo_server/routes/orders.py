@@ -26,10 +26,11 @@ from silo_server.routes.made_files import CSV, XLSX, content_of, file_of
 from silo_server.routes.models import Brief, RequestBody, Short, Text
 from silo_server.routes.requests import ExpectedVersion
 from silo_server.services import orders, suppliers
-from silo_server.services.bom import transfer
 from silo_server.services.bom.import_table import Layout, Record, as_csv, guess_of, read_csv
 from silo_server.services.items import get_item
 from silo_server.services.orders import NewOrder, OrderRequest, OrderRow, Recorded
+from silo_server.services.product.export import Export
+from silo_server.services.product.export_files import to_csv, to_xlsx
 from silo_server.services.suppliers import decimal_text
 
 router = APIRouter(prefix="/api", tags=["orders"], responses=READ_ERRORS)
@@ -257,7 +258,7 @@ def order_csv(
     semicolons: bool = False,
 ) -> Response:
     """Return the parts of one kind as CSV; with ``supplier`` only those from this supplier."""
-    write = partial(transfer.to_csv, semicolons=semicolons)
+    write = partial(to_csv, semicolons=semicolons)
     return _exported(call, part_number, asked, kind, supplier, write, CSV)
 
 
@@ -266,13 +267,13 @@ def order_xlsx(
     call: Viewer, part_number: str, asked: AskedFor, kind: Kind = orders.BOUGHT, supplier: Supplier = None
 ) -> Response:
     """Return the parts of one kind as a workbook; with ``supplier`` only those from this supplier."""
-    return _exported(call, part_number, asked, kind, supplier, transfer.to_xlsx, XLSX)
+    return _exported(call, part_number, asked, kind, supplier, to_xlsx, XLSX)
 
 
 def _exported(
     call: Call, part_number: str, asked: OrderRequest, kind: str, supplier: str | None, write: Any, media: str
 ) -> Response:
-    def make(tx: Any) -> transfer.Export:
+    def make(tx: Any) -> Export:
         return orders.export_orders(orders.order_list(tx, part_number, asked), kind, supplier)
 
     end = "xlsx" if media == XLSX else "csv"

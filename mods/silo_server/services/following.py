@@ -17,9 +17,10 @@ from silo_server.db.tables import bom_last_syncs, follows, items, product_looks
 from silo_server.db.tables import events as event_log
 from silo_server.db.transaction import Tx
 from silo_server.events import log
-from silo_server.services.bom.summary import LastChange, Summary, at_once
 from silo_server.services.bom.waiting import waiting_in
 from silo_server.services.items import get_by_uuids
+from silo_server.services.product.summary import LastChange, Summary
+from silo_server.services.product.summary_read import at_once
 from silo_server.values import Item
 
 ITEM, FOLDER = "item:", "folder:"

@@ -24,13 +24,15 @@ from silo_server.db.tables import document_items, documents, items, orders, revi
 from silo_server.db.transaction import Tx
 from silo_server.fields import from_row
 from silo_server.services import audit
-from silo_server.services.bom.frozen import frozen_product
-from silo_server.services.bom.summary import Summary, own_worth, summary_of
-from silo_server.services.bom.transfer import Export, Row, View
 from silo_server.services.items import get_item
+from silo_server.services.product.export import Export, Row, View
 from silo_server.services.product.flat import FlatRow, flatten
+from silo_server.services.product.frozen import frozen_product
 from silo_server.services.product.graph import Graph, load_graph
 from silo_server.services.product.parts import RolledItem, parts_of
+from silo_server.services.product.summary import Summary
+from silo_server.services.product.summary_make import own_worth
+from silo_server.services.product.summary_read import summary_of
 from silo_server.services.releases import Release, get_release, newest_release
 from silo_server.services.suppliers import (
     SupplierOffer,
@@ -250,7 +252,7 @@ def _state(
     instead = f"; revision {newest.label} is released" if newest else ""
     warnings = [f"This is the draft, not a released revision{instead}"]
     if summary.open:
-        lines = [f"{number}: {words}" for number, words in summary.told()]
+        lines = [f"{number}: {words}" for number, words in summary.open_boms()]
         what = counted(summary.questions, "question") + " open, " if summary.questions else ""
         warnings.append(f"{what}{counted(len(lines), 'BOM')} with something open: {listed(lines, 20)}")
     if not graph.lines:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Released revisions of a product: draft → in review → released → obsolete.
 
-A submission freezes the whole product (:mod:`silo_server.services.bom.frozen`). A revision is a label and the
-record of the product, so nothing that happens later changes it, and no retention touches it. Reviewers
+A submission freezes the whole product (:mod:`silo_server.services.product.frozen`). A revision is a label and
+the record of the product, so nothing that happens later changes it, and no retention touches it. Reviewers
 approve exactly what was frozen.
 
 **What blocks.** Open questions and incomplete syncs on any level, parts of our own without a file, and parts

@@ -27,11 +27,11 @@ from silo_server.routes.requests import PageFrom
 from silo_server.services import revisions
 from silo_server.services.bom import history
 from silo_server.services.bom.differences import compare
-from silo_server.services.bom.frozen import changes_of
 from silo_server.services.bom.restore import restore_bom
 from silo_server.services.items import get_by_uuids, get_item
 from silo_server.services.looks import last_look
 from silo_server.services.product.changes import PastChange
+from silo_server.services.product.frozen import changes_of
 from silo_server.services.product.graph import ids_below
 from silo_server.services.releases import NUMBERED, list_releases
 from silo_server.values import Item

@@ -30,17 +30,6 @@ from silo_server.schema import ITEM_TYPES, find_schema
 from silo_server.services import documents, revisions
 from silo_server.services.bom.last_sync import in_sentences, last_sync
 from silo_server.services.bom.lines import lines_of_many
-from silo_server.services.bom.summary import (
-    MOST_NAMED,
-    MassAndCost,
-    Summary,
-    at_once,
-    marks_of,
-    own_worth,
-    standing_alone,
-    summaries,
-    summary_of,
-)
 from silo_server.services.documents import documents_holding, get_document
 from silo_server.services.following import is_followed
 from silo_server.services.items import ItemQuery, get_item, list_items
@@ -51,6 +40,9 @@ from silo_server.services.product.graph import MAX_DEPTH, Graph, load_graph
 from silo_server.services.product.line_filter import found_parts, leading_to, sought
 from silo_server.services.product.parts import RolledItem, parts_of, some_parts
 from silo_server.services.product.rollup import roll_up_cost, roll_up_mass
+from silo_server.services.product.summary import MassAndCost, Summary
+from silo_server.services.product.summary_make import MOST_NAMED, own_worth
+from silo_server.services.product.summary_read import at_once, marks_of, standing_alone, summaries, summary_of
 from silo_server.services.product.where_used import use_counts, where_used
 from silo_server.values import Item, Line
 from silo_server.web.accounts import Reader

@@ -23,9 +23,10 @@ from silo_server.db.transaction import Tx
 from silo_server.schema import text_hints
 from silo_server.services.bom import history
 from silo_server.services.bom.change import ChangeKind
+from silo_server.services.bom.conflicts import last_cad_quantities
 from silo_server.services.bom.decisions import Decision, ReviewAction
 from silo_server.services.bom.history import Change, ChangedLine
-from silo_server.services.bom.review import Review, told_quantities
+from silo_server.services.bom.review import Review
 from silo_server.values import Item, Line, LineState
 from silo_server.web.forms import Edit, amount, compared, same_text, text, texts, whole
 from silo_server.web.render import N_, _, isolate, plural, quantity
@@ -204,7 +205,7 @@ def disputed(
     tx: Tx, parent: Item, lines: Sequence[Line], review: Review
 ) -> tuple[dict[str, str], dict[str, str]]:
     """Describe who set quantities here, and what CAD says of these lines; both by line id."""
-    told_quantity = told_quantities(tx, [parent.id]).get(parent.id, {})
+    cad_quantities = last_cad_quantities(tx, [parent.id]).get(parent.id, {})
     overrides = [line for line in lines if line.state.override]
     asked = {*(line.id for line in overrides), *(conflict.line.id for conflict in review.conflicts)}
     stories = history.stories(tx, parent, asked)
@@ -212,7 +213,7 @@ def disputed(
     return (
         {line_id: by_whom(change) for line_id, change in by_hand.items()},
         {
-            line.id: _cad_words(line, told_quantity, by_hand.get(line.id), review.last_merge)
+            line.id: _cad_words(line, cad_quantities, by_hand.get(line.id), review.last_merge)
             for line in overrides
         },
     )

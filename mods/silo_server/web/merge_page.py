@@ -35,8 +35,8 @@ from silo_server.services.bom.last_sync import in_sentences, last_sync
 from silo_server.services.bom.line_state import mark_of
 from silo_server.services.bom.lines import LineId, component_of, line_of, lines_of
 from silo_server.services.bom.restore import undo_change
-from silo_server.services.bom.summary import summary_of
 from silo_server.services.items import get_item
+from silo_server.services.product.summary_read import summary_of
 from silo_server.services.revisions import files_until, has_file
 from silo_server.services.search import fits
 from silo_server.values import Line, LineState
@@ -311,7 +311,7 @@ def _show(call: Call, part_number: str, asked: PageState, status: int = 200) -> 
         recent = history.list_changes(tx, item, LATER_CHANGES)
         seen = log.head(tx)
         try:
-            below = summary_of(tx, item).told(item.id)
+            below = summary_of(tx, item).open_boms(item.id)
         except (BusyError, CycleError) as error:
             below, asked = [], replace(asked, problem=asked.problem or _sentence(error))
         by_hand, cad_words = line_form.disputed(tx, item, lines, review_of)

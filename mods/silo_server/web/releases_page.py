@@ -19,11 +19,11 @@ from silo_server.routes.call import Call
 from silo_server.routes.releases import frozen_now
 from silo_server.services import releases
 from silo_server.services.access.users import get_user
-from silo_server.services.bom.frozen import ProductContent, frozen_product
-from silo_server.services.bom.summary import summary_of
 from silo_server.services.items import get_item
 from silo_server.services.product.flat import flatten
+from silo_server.services.product.frozen import ProductContent, frozen_product
 from silo_server.services.product.graph import MAX_DEPTH
+from silo_server.services.product.summary_read import summary_of
 from silo_server.services.product.tree import expand
 from silo_server.services.releases import Release
 from silo_server.values import Item

@@ -294,7 +294,8 @@ def test_no_cells_are_lost(rows: list[tuple[str, str, str]]) -> None:
 
 def test_the_servers_real_export_is_read() -> None:
     """What silo_server writes as CSV comes back, in both forms: odd names, structure, masses."""
-    exports = pytest.importorskip("silo_server.services.bom.transfer")
+    exports = pytest.importorskip("silo_server.services.product.export")
+    export_files = pytest.importorskip("silo_server.services.product.export_files")
     common = {"Item type": "part", "Relation type": "component", "Source": "assembly"}
     rows = [
         {"Item": "1", "Level": 1, "Part number": "A01-0002", "Name": "Gearbox", "Quantity": 2.0, "Unit": "ea"}
@@ -319,7 +320,7 @@ def test_the_servers_real_export_is_read() -> None:
     ]
     for semicolons in (False, True):
         made = exports.Export(None, exports.View.INDENTED, iter(rows), ["Incomplete: A01-0001 1 missing"])
-        exports.to_csv(made, out := io.BytesIO(), semicolons=semicolons)
+        export_files.to_csv(made, out := io.BytesIO(), semicolons=semicolons)
         table = BOMParser().parse_bytes(out.getvalue())
         assert [(r.name, r.part_number, r.quantity, r.level) for r in table.rows] == [
             ("Gearbox", "A01-0002", 2, 1),

@@ -82,7 +82,7 @@ def run_summaries(args: argparse.Namespace) -> int:
     need_server_extra()
     from silo_server.db.database import Database
     from silo_server.db.migrate import upgrade
-    from silo_server.services.bom.summary import keep_all
+    from silo_server.services.product.summary_keep import keep_all
     from silo_server.settings import settings_from_environment
 
     settings = settings_from_environment(database_url=args.database, files_dir=args.files)

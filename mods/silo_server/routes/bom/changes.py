@@ -14,9 +14,10 @@ from silo_server.routes import openapi
 from silo_server.routes.bom import bom_router
 from silo_server.routes.call import Viewer
 from silo_server.routes.made_files import CSV, XLSX, content_of, file_of
-from silo_server.services.bom import transfer
-from silo_server.services.bom.frozen import changes_of
 from silo_server.services.items import get_item
+from silo_server.services.product.export import export_changes
+from silo_server.services.product.export_files import to_csv, to_xlsx
+from silo_server.services.product.frozen import changes_of
 from silo_server.times import wire_time
 
 router = bom_router("bom transfer")
@@ -47,12 +48,12 @@ def get_changes(call: Viewer, part_number: str, since: Since, to: Moment = "") -
 @router.get("/changes.csv", response_class=Response, responses=content_of("text/csv"))
 def changes_csv(call: Viewer, part_number: str, since: Since, to: Moment = "") -> Response:
     """Return the changes in a product as CSV."""
-    make = partial(transfer.export_changes, part_number=part_number, since=since, until=to)
-    return file_of(call, make, transfer.to_csv, CSV, "changes.csv")
+    make = partial(export_changes, part_number=part_number, since=since, until=to)
+    return file_of(call, make, to_csv, CSV, "changes.csv")
 
 
 @router.get("/changes.xlsx", response_class=Response, responses=content_of(XLSX))
 def changes_xlsx(call: Viewer, part_number: str, since: Since, to: Moment = "") -> Response:
     """Return the changes in a product as a workbook."""
-    make = partial(transfer.export_changes, part_number=part_number, since=since, until=to)
-    return file_of(call, make, transfer.to_xlsx, XLSX, "changes.xlsx")
+    make = partial(export_changes, part_number=part_number, since=since, until=to)
+    return file_of(call, make, to_xlsx, XLSX, "changes.xlsx")

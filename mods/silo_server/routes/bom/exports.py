@@ -15,8 +15,8 @@ from silo_server.db.transaction import Tx
 from silo_server.routes.bom import bom_router
 from silo_server.routes.call import Call, Viewer
 from silo_server.routes.made_files import CSV, XLSX, content_of, file_of
-from silo_server.services.bom import transfer
-from silo_server.services.bom.transfer import View
+from silo_server.services.product.export import Export, View, export
+from silo_server.services.product.export_files import to_csv, to_json, to_xlsx
 
 router = bom_router("bom transfer")
 
@@ -43,7 +43,7 @@ def export_csv(call: Viewer, part_number: str, wanted: As, semicolons: bool = Fa
     ``pieces``: totals for so many pieces; ``q``, ``type``: only the lines that match. ``semicolons``: for an
     Excel that expects 1,5 instead of 1.5.
     """
-    write = partial(transfer.to_csv, semicolons=semicolons)
+    write = partial(to_csv, semicolons=semicolons)
     return _exported(call, part_number, wanted, write, CSV, "csv")
 
 
@@ -51,27 +51,27 @@ def export_csv(call: Viewer, part_number: str, wanted: As, semicolons: bool = Fa
 def export_xlsx(call: Viewer, part_number: str, wanted: As, pictures: bool = False) -> Response:
     """Return the BOM as a workbook. ``pictures``: the first 2000 rows show a picture of their part."""
     shown = call.server.files.path_of if pictures else None
-    return _exported(call, part_number, wanted, partial(transfer.to_xlsx, picture=shown), XLSX, "xlsx")
+    return _exported(call, part_number, wanted, partial(to_xlsx, picture=shown), XLSX, "xlsx")
 
 
 @router.get("/export.json")
 def export_json(call: Viewer, part_number: str, wanted: As) -> Response:
     """Return the BOM as JSON."""
-    return _exported(call, part_number, wanted, transfer.to_json, "application/json", "json")
+    return _exported(call, part_number, wanted, to_json, "application/json", "json")
 
 
 def _exported(
     call: Call,
     part_number: str,
     wanted: ExportRequest,
-    write: Callable[[transfer.Export, IO[bytes]], Callable[[], None] | None],
+    write: Callable[[Export, IO[bytes]], Callable[[], None] | None],
     media_type: str,
     suffix: str,
 ) -> Response:
     view, pieces = wanted.view, wanted.pieces
 
-    def make(tx: Tx) -> transfer.Export:
-        return transfer.export(tx, part_number, view, pieces, wanted.q, wanted.type, wanted.release)
+    def make(tx: Tx) -> Export:
+        return export(tx, part_number, view, pieces, wanted.q, wanted.type, wanted.release)
 
     many = f"-{wanted.release}" if wanted.release else ""
     many += f"-for-{pieces}" if pieces > 1 else ""

@@ -23,11 +23,11 @@ from silo_server.routes.models import (
 )
 from silo_server.routes.requests import ExpectedVersion
 from silo_server.services.bom import line_edit
+from silo_server.services.bom.conflicts import last_cad_quantities
 from silo_server.services.bom.last_sync import NEVER, last_syncs
 from silo_server.services.bom.line_edit import Edited
 from silo_server.services.bom.line_wire import line_to_wire
 from silo_server.services.bom.lines import LineId, check_line_count, lines_of_many
-from silo_server.services.bom.review import told_quantities
 from silo_server.services.items import get_by_numbers, get_item
 from silo_server.values import Item, LineState
 
@@ -62,7 +62,7 @@ def get_boms(call: Viewer, body: NumbersBody) -> Response:
 def _lines_of(tx: Tx, parents: Sequence[Item]) -> dict[int, list[dict[str, Any]]]:
     """Return the BOM lines of these items as the API sends them, by the item's internal id."""
     ids = [parent.id for parent in parents]
-    lines, quantities, last = lines_of_many(tx, ids), told_quantities(tx, ids), last_syncs(tx, ids)
+    lines, quantities, last = lines_of_many(tx, ids), last_cad_quantities(tx, ids), last_syncs(tx, ids)
     return {
         parent.id: [
             {

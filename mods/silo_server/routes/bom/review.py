@@ -19,7 +19,7 @@ from silo_server.routes.requests import ExpectedVersion
 from silo_server.services.bom import decisions, review
 from silo_server.services.bom.decisions import Decision, ReviewAction
 from silo_server.services.bom.line_wire import line_to_wire
-from silo_server.services.bom.summary import summary_of
+from silo_server.services.product.summary_read import summary_of
 from silo_server.times import wire_time
 
 router = bom_router("bom review")
@@ -48,7 +48,7 @@ def get_review(call: Viewer, part_number: str) -> Response:
     """Return the open questions of a BOM: unreferenced lines, conflicts (both values), and the last merge."""
     with call.read() as tx:
         bom_review = review.review(tx, part_number)
-        open_below = summary_of(tx, bom_review.parent).told(bom_review.parent.id)
+        open_below = summary_of(tx, bom_review.parent).open_boms(bom_review.parent.id)
     name = bom_review.parent.part_number
     body = {
         "part_number": name,

@@ -9,8 +9,9 @@ from silo.bom.quantities import plain
 from silo_server.fields import to_wire
 from silo_server.routes.bom import bom_router
 from silo_server.routes.call import Viewer
-from silo_server.services.bom.summary import Summary, summary_of
 from silo_server.services.items import get_item
+from silo_server.services.product.summary import Summary
+from silo_server.services.product.summary_read import summary_of
 from silo_server.times import wire_time
 
 router = bom_router("bom")

@@ -18,12 +18,12 @@ from silo_server.routes.bom.summary import open_to_wire
 from silo_server.routes.call import Viewer
 from silo_server.routes.models import LineOut
 from silo_server.services.bom.line_wire import child_to_wire, line_state_to_wire, revisions_to_wire
-from silo_server.services.bom.summary import standing_alone, summary_of
 from silo_server.services.items import get_item
 from silo_server.services.product.flat import flatten
 from silo_server.services.product.graph import MAX_DEPTH, load_graph
 from silo_server.services.product.parts import parts_of, positive_number
 from silo_server.services.product.rollup import roll_up_cost, roll_up_mass
+from silo_server.services.product.summary_read import standing_alone, summary_of
 from silo_server.services.product.tree import Occurrence, expand
 from silo_server.services.product.where_used import where_used
 from silo_server.values import LineState

@@ -24,8 +24,9 @@ from silo_server.services.bom.change import (
     apply_changes,
     parent_to_change,
 )
+from silo_server.services.bom.conflicts import CadQuantity, Conflict, open_conflicts
 from silo_server.services.bom.lines import LineId, component_of, lines_of
-from silo_server.services.bom.review import Conflict, marks_of, open_conflicts, review
+from silo_server.services.bom.review import marks_of, review
 from silo_server.services.bom.waiting import conflicts_mark
 from silo_server.services.items import get_item
 from silo_server.values import Item, Line, LineState
@@ -187,7 +188,8 @@ def lines_for(tx: Tx, part_number: str, action: ReviewAction, seen: str) -> tupl
         lines = list(found.unreferenced)
         gone = lines if action is ReviewAction.REMOVE else []
     conflicts = {
-        conflict.line.child_id: (conflict.cad_quantity, conflict.since) for conflict in found.conflicts
+        conflict.line.child_id: CadQuantity(conflict.cad_quantity, conflict.since)
+        for conflict in found.conflicts
     }
     if lines and seen != conflicts_mark(found.parent.bom_version, conflicts):
         raise VersionConflictError(f"the BOM of {part_number} has changed since you looked")

@@ -19,13 +19,13 @@ from silo.bom.left_out import Reason
 from silo_server.db.rows import one_of
 from silo_server.db.tables import INCOMPLETE, UNREFERENCED, assignees, bom_last_syncs, bom_lines, items, users
 from silo_server.db.transaction import Tx
-from silo_server.services.bom.conflicts import Told, conflicts_in
+from silo_server.services.bom.conflicts import CadQuantities, conflicts_in
 
 
 class Waiting(NamedTuple):
     """A BOM that waits, and for what. ``left_out`` counts what was left out, without unregistered parts.
 
-    told
+    cad_quantities
         CAD's quantities in its conflicts, by the child's internal id.
     """
 
@@ -36,7 +36,7 @@ class Waiting(NamedTuple):
     folder: str
     document_file: str
     synced_at: str | None
-    told: Told
+    cad_quantities: CadQuantities
     assignee: str
     unreferenced: int
     left_out: int
@@ -45,12 +45,12 @@ class Waiting(NamedTuple):
     @property
     def conflicts(self) -> int:
         """Count the lines for which CAD has another quantity."""
-        return len(self.told)
+        return len(self.cad_quantities)
 
     @property
     def mark(self) -> str:
         """Make the mark of what is decided about: the BOM's version, and CAD's quantities in conflict."""
-        return conflicts_mark(self.version, self.told)
+        return conflicts_mark(self.version, self.cad_quantities)
 
 
 def waiting(tx: Tx) -> list[Waiting]:
@@ -59,7 +59,7 @@ def waiting(tx: Tx) -> list[Waiting]:
     Reads only what a list of them is filtered and sorted by: there may be thousands.
     """
     unreferenced, conflicts, gaps = _unreferenced(tx), conflicts_in(tx), _gaps(tx)
-    row, last, nobody = items.c, bom_last_syncs.c, Told()
+    row, last, none = items.c, bom_last_syncs.c, CadQuantities()
     shown = (row.id, row.part_number, row.name, row.bom_version, last.folder, last.document_file, last.at)
     query = (
         select(*shown, users.c.username)
@@ -72,7 +72,7 @@ def waiting(tx: Tx) -> list[Waiting]:
         Waiting(
             *(record, number, name, version, folder or "", file or "", at),
             *(
-                conflicts.get(record, nobody),
+                conflicts.get(record, none),
                 who or "",
                 unreferenced[record],
                 *gaps.get(record, (0, 0)),
@@ -112,10 +112,10 @@ def _count(tx: Tx, which: Callable[[ColumnElement[int]], ColumnElement[bool]]) -
     )
 
 
-def conflicts_mark(version: int, conflicts: Told) -> str:
+def conflicts_mark(version: int, conflicts: CadQuantities) -> str:
     """Make the mark of a BOM's version and of CAD's quantities in conflict."""
     # A sync that only brings other conflicts changes no line, and so not the version.
-    digest = repr(sorted((child, conflict[0]) for child, conflict in conflicts.items()))
+    digest = repr(sorted((child, conflict.quantity) for child, conflict in conflicts.items()))
     return f"{version}-{hashlib.sha256(digest.encode()).hexdigest()[:16]}"
 
 

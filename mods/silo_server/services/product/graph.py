@@ -19,7 +19,7 @@ from silo_server.db.rows import among
 from silo_server.db.tables import bom_lines, items
 from silo_server.db.transaction import Tx
 from silo_server.errors import TooLargeError
-from silo_server.services.bom.conflicts import Told, conflicts_in
+from silo_server.services.bom.conflicts import CadQuantities, cad_quantity_of, conflicts_in
 from silo_server.services.bom.lines import child_of, select_lines, to_line
 from silo_server.values import Item, Line
 
@@ -32,17 +32,16 @@ class Graph:
 
     root: Item
     lines: Mapping[int, Sequence[Line]]
-    conflicts: Mapping[int, Told] = field(default_factory=dict)
+    conflicts: Mapping[int, CadQuantities] = field(default_factory=dict)
 
-    def told(self, line: Line) -> float | None:
+    def cad_quantity(self, line: Line) -> float | None:
         """Return CAD's quantity for a line in conflict (0: not in CAD); None if there is no conflict."""
-        if line.state.rel_type != "component" or line.child_id not in self.conflicts.get(line.parent_id, ()):
-            return None
-        return self.conflicts[line.parent_id][line.child_id][0]
+        said = cad_quantity_of(line, self.conflicts.get(line.parent_id, {}))
+        return None if said is None else said.quantity
 
     def doubts(self, line: Line) -> list[str]:
         """List what a person still has to decide about a line, in words."""
-        quantity = self.told(line)
+        quantity = self.cad_quantity(line)
         doubts = ["unreferenced"] if line.state.unreferenced_since else []
         if quantity is not None:
             doubts.append(f"CAD says {plain(quantity)}" if quantity else "CAD no longer has it")

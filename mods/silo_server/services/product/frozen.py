@@ -26,7 +26,6 @@ from silo_server.db.transaction import Tx
 from silo_server.services.bom.differences import compare
 from silo_server.services.bom.history import NamedItem, PastLine
 from silo_server.services.bom.line_state import state_to_json, stored_state
-from silo_server.services.bom.summary import MassAndCost, OpenBom, Summary, summaries
 from silo_server.services.items import by_ids
 from silo_server.services.product.changes import (
     PastChange,
@@ -38,6 +37,8 @@ from silo_server.services.product.changes import (
 from silo_server.services.product.graph import Graph, load_graph, order_of
 from silo_server.services.product.moments import moment
 from silo_server.services.product.parts import RolledItem, with_supplier
+from silo_server.services.product.summary import MassAndCost, OpenBom, Summary
+from silo_server.services.product.summary_read import summaries
 from silo_server.services.releases import FrozenProduct, Release, find_release, item_of, read_records
 from silo_server.user_json import dumps
 from silo_server.values import Item, Line, bought

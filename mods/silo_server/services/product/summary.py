@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The one summary of a product over its whole graph: what is open, mass and cost, counts, the last change.
+
+Every view, export and answer shows it and counts nothing itself.
+
+Mass: each leaf's ``mass_kg`` [kg] times its total quantity. If something below a sub-assembly has no mass but
+the sub-assembly states ``mass_kg``, that stands for the whole of it. Cost: each leaf's ``standard_cost``, per
+``currency``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import NamedTuple
+
+from silo.bom.errors import counted
+
+
+class OpenBom(NamedTuple):
+    """What is open in one BOM: lines that CAD no longer has, conflicts, and what its last sync left out."""
+
+    part_number: str
+    unreferenced: int = 0
+    conflicts: int = 0
+    incomplete: str = ""
+
+    @property
+    def questions(self) -> str:
+        """Count what a person has to decide there, in words."""
+        counts = ((self.unreferenced, "unreferenced line"), (self.conflicts, "conflict"))
+        return ", ".join(counted(count, word) for count, word in counts if count)
+
+    @property
+    def words(self) -> str:
+        """Describe all that is open, with what the last sync left out."""
+        return ", ".join(filter(None, (self.questions, self.incomplete)))
+
+
+class MassAndCost(NamedTuple):
+    """What one piece of an item weighs [kg] and costs, per currency; of an assembly, all that is in it.
+
+    ``whole``: nothing that belongs to it is without a value.
+    """
+
+    mass: Decimal | None
+    mass_whole: bool
+    costs: Mapping[str, Decimal]
+    cost_whole: bool
+
+
+class LastChange(NamedTuple):
+    """When something of the product changed last, who did it, and to which item."""
+
+    at: str
+    username: str
+    part_number: str
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """One product, or a part.
+
+    open
+        a BOM's internal id → what is open there; of the product's own BOM and of all below it.
+    worth, as_part
+        mass and cost of what is in it; and those that it counts with in another product.
+    levels
+        how many rows each level of its tree has, at most ``MAX_DEPTH`` levels.
+    parts, assemblies, lines
+        how many different leaf parts and sub-assemblies are in it, and lines in all their BOMs.
+    no_mass, no_cost
+        how many of the parts lack a value that nothing above them states.
+    mass_missing, cost_missing
+        the first of their part numbers.
+    outdated
+        lines, over all levels, that name an older revision than the newest.
+    """
+
+    open: Mapping[int, OpenBom]
+    worth: MassAndCost
+    as_part: MassAndCost
+    changed: LastChange
+    levels: Sequence[int] = ()
+    parts: int = 0
+    assemblies: int = 0
+    lines: int = 0
+    no_mass: int = 0
+    no_cost: int = 0
+    outdated: int = 0
+    mass_missing: Sequence[str] = ()
+    cost_missing: Sequence[str] = ()
+
+    def open_boms(self, but: int | None = None) -> list[tuple[str, str]]:
+        """List (part number, what is open there) of each BOM except ``but``, by part number."""
+        return sorted((bom.part_number, bom.words) for item_id, bom in self.open.items() if item_id != but)
+
+    def inside(self, own: int, *, is_open: bool) -> list[str]:
+        """Describe what is open in an item, for its row in a tree.
+
+        ``own`` is the item's internal id. An open row shows its lines, so that only what is incomplete is
+        named.
+        """
+        here = self.open.get(own, OpenBom(""))
+        below = len(self.open) - (own in self.open)
+        words = [here.incomplete]
+        if not is_open:
+            words += [here.questions, f"open in {counted(below, 'BOM')} below" if below else ""]
+        return [*filter(None, words)]
+
+    @property
+    def stands_alone(self) -> bool:
+        """Return True if the assembly states its mass in place of parts that state none."""
+        return self.as_part.mass_whole and not self.worth.mass_whole
+
+    @property
+    def questions(self) -> int:
+        """Count the lines that wait for a person."""
+        return sum(bom.unreferenced + bom.conflicts for bom in self.open.values())
+
+    @property
+    def incomplete(self) -> int:
+        """Count the BOMs that lack something."""
+        return sum(bool(bom.incomplete) for bom in self.open.values())
