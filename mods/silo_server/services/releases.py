@@ -286,9 +286,9 @@ def approve(tx: Tx, part_number: str, label: str, comment: str, override: str = 
     if blocks and not override:
         shown = "; ".join(blocks[:5]) + (f"; and {len(blocks) - 5} more" if len(blocks) > 5 else "")
         way = (
-            "mend that and submit it again, or say why it is released anyway (override)"
+            "fix that and submit it again, or say why it is released anyway (override)"
             if tx.settings.release_override
-            else "mend that and submit it again"
+            else "fix that and submit it again"
         )
         raise ConflictError(f"revision {label} of {item.part_number} cannot be released: {shown}; {way}")
     if blocks and not tx.settings.release_override:
