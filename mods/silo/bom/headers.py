@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
 from enum import StrEnum
 from typing import Any
 
@@ -44,14 +43,19 @@ class Heading(StrEnum):
     SUPPLIER = "supplier"
     SUPPLIER_NUMBER = "supplier_part_number"
     NOT_FITTED = "not_fitted"
+    FITTED = "fitted"
     LINK = "link"
     PACK_SIZE = "pack_size"
     MINIMUM = "minimum"
     PRICE = "prices"
+    PRICE_BASIS = "price_basis"
     FROM_QUANTITY = "from"
     CURRENCY = "currency"
     LEAD_TIME = "lead_time_days"
     PREFERRED = "preferred"
+    CATEGORY = "category"
+    ITEM_TYPE = "item_type"
+    SOURCING = "sourcing_type"
 
 
 # en, de, fr, es, it, ja, zh; Silo's and FreeCAD's own exports among them. The first alias fits best.
@@ -62,12 +66,16 @@ _ALIASES: dict[Heading, str] = {
         nome componente; denominazione; 名前; 名称; 部品名; 品名; パーツ名; 部品; 名稱; 零件名称;
         零件; 部件名称; 이름; item name;
         objektkurztext; materialkurztext; designation; piece; denominacion; part""",
-    Heading.PART_NUMBER: """part number; part no; part nr; partnumber; pn; item number; article number;
-        article no; sku; child part number; teilenummer; teile nr; artikelnummer; artikel nr; sachnummer;
+    Heading.PART_NUMBER: """part number; ipn; part ipn; internal part number; internal reference;
+        part no; part nr;
+        partnumber; pn; item number; article number; article no; child part number; our part number;
+        our number; unsere artikelnummer; interne artikelnummer; interne teilenummer; materialnummer;
+        teilenummer; teile nr; artikelnummer; artikel nr; sachnummer;
         numéro de pièce; référence; réf; número de pieza; número de parte; referencia; código; numero parte;
         codice; codice articolo; 部品番号; 品番; 型番; 図番;
         零件编号; 零件号; 零件號; 料号; 料號; 物料编码; number; item id;
-        bauteilnummer; komponentennummer; n de pièce; n o de pièce; numero de piece; n de pieza; n o de pieza;
+        bauteilnummer; komponentennummer; n de pièce; n o de pièce; numero de piece; n de pieza;
+        n o de pieza;
         numero de pieza; numero de parte; codigo; 부품 번호""",
     Heading.DESCRIPTION: """description; desc; child description; beschreibung; descripción; descripcion;
         descrizione; 説明; 描述; 说明; 説明文; 備考""",
@@ -79,7 +87,8 @@ _ALIASES: dict[Heading, str] = {
         peso; peso unitario; massa; massa unitaria; 質量; 重量; 单重; 質量 単体; 质量; 单件质量; 單重; gew;
         einzelgew; nettogewicht; pds; 単重; 単体質量; 単体重量; 净重; 单件重量; 질량; 무게;
         wt; unit wt; nx mass; sw mass; pro mp mass; mp mass""",
-    Heading.TOTAL_MASS: """total mass; total weight; mass total; weight total; extended mass; extended weight;
+    Heading.TOTAL_MASS: """total mass; total weight; mass total; weight total; extended mass;
+        extended weight;
         gesamtmasse; gesamtgewicht; masse totale; poids total; masa total; peso total; massa totale;
         peso totale; 总重量; 総質量; 総重量; 合計質量; 总质量; 总重; 總重; 合计重量;
         小计重量; 質量計; 重量計; total wt; ext wt; posgewicht; pos gewicht; positionsgewicht""",
@@ -92,9 +101,12 @@ _ALIASES: dict[Heading, str] = {
         repère; article; elemento; artículo; posición; ítem; posizione; voce; 項目; 番号; 项目; 项; 序号;
         編號; 序號; 项目号; アイテム番号; 항목; 항목 번호; pos nr; positionsnummer; objekt; element; élément;
         no article; n articolo; n de elemento; n o de elemento; articulo; posicion""",
-    Heading.LEVEL: """level; depth; indent; ebene; stufe; niveau; nivel; livello; レベル; 階層;
+    Heading.LEVEL: """level; bom level; structure level; depth; indent; indentation; ebene; stufe;
+        strukturstufe;
+        stücklistenebene; niveau; nivel; livello; レベル; 階層;
         级别; 层级; 層級""",
-    Heading.UNIT: """unit; uom; unit of measure; einheit; mengeneinheit; unité; unidad; unità; 単位; 单位""",
+    Heading.UNIT: """unit; units; uom; unit of measure; einheit; einheiten; mengeneinheit; me; bme;
+        basismengeneinheit; unité; unités; unidad; unidades; unità; 単位; 单位""",
     Heading.REFERENCE_DESIGNATORS: """reference designators; reference designator; ref des; refdes;
         designators; designator; references; reference; reference s; ref; refs; ref s""",
     Heading.FIND_NUMBER: """find number; find no; find nr; findnumber""",
@@ -112,26 +124,47 @@ _ALIASES: dict[Heading, str] = {
         hersteller artikelnummer""",
     Heading.SUPPLIER: """supplier; vendor; distributor; supplier name; vendor name; lieferant; händler;
         fournisseur; proveedor; fornitore; 供应商; 仕入先""",
-    Heading.SUPPLIER_NUMBER: """supplier part number; supplier s part number; spn; supplier part no;
+    Heading.SUPPLIER_NUMBER: """supplier part number; supplier s part number; spn; sku; supplier sku;
+        vendor sku; supplier part no;
+        vendor product code; artikelnummer lieferant; lieferanten artikelnummer;
+        artikelnummer des lieferanten;
         supplier pn; vendor part number; distributor part number; bestellnummer; order number; order code;
         lcsc; supplier number; supplier no; order no; vendor number; bestell nr; lieferantenartikelnummer;
         lieferantennummer; référence fournisseur; numéro de commande;
         lcsc part number; digikey part number; digi key part number; mouser part number""",
-    Heading.NOT_FITTED: """dnp; dnf; do not populate; do not fit; do not place; not fitted""",
+    Heading.NOT_FITTED: """dnp; dnf; dni; nf; do not populate; do not fit; do not place; do not install;
+        not fitted;
+        not populated; not installed; excluded; exclude; exclude from bom; excluded from bom;
+        nicht bestückt;
+        nicht bestücken; unbestückt; non monté; no montar; non montare""",
+    Heading.FITTED: """populate; populated; fitted; fit; installed; install; mounted; place; placed;
+        included;
+        include; bestückt; bestücken; montiert; monté; montado; montato""",
     Heading.LINK: """link; url; web address; web; product link; shop link""",
     Heading.PACK_SIZE: """pack size; pack; pack quantity; package size; packaging unit; pack qty; vpe;
         verpackungseinheit; packungsgröße; conditionnement""",
-    Heading.MINIMUM: """minimum; minimum order; minimum order quantity; minimum quantity; min order; min qty;
+    Heading.MINIMUM: """minimum; minimum order; minimum order quantity; minimum quantity; min order;
+        min qty;
         moq; mindestmenge; mindestbestellmenge; quantité minimale""",
     Heading.PRICE: """price; unit price; price each; price of one by quantity; price of one; prices;
-        unit cost; preis; stückpreis; einzelpreis; prix; prix unitaire; precio; prezzo; 单价; 単価""",
+        unit cost; price list; preis; preise; stückpreis; einzelpreis; nettopreis; einkaufspreis;
+        ek preis; prix; prix unitaire; precio; prezzo; 单价; 単価""",
+    Heading.PRICE_BASIS: """price basis; price unit; pricing unit; price unit quantity; price per; per;
+        preiseinheit; preis pro; preisbasis; pe; unité de prix; prix par; unidad de precio""",
     Heading.FROM_QUANTITY: """from quantity; from; price from quantity; break; price break; break quantity;
         scale quantity; ab menge; staffelmenge; ab stückzahl; à partir de""",
     Heading.CURRENCY: """currency; währung; devise; moneda; valuta; 货币; 通貨""",
     Heading.LEAD_TIME: """lead time; lead time days; delivery time; lieferzeit; lieferzeit tage; délai;
         délai de livraison; plazo de entrega""",
     Heading.PREFERRED: """preferred; favourite; default; bevorzugt; préféré""",
+    Heading.CATEGORY: """category; part category; product category; kategorie; warengruppe; materialgruppe;
+        artikelgruppe; catégorie; categoría; categoria""",
+    Heading.ITEM_TYPE: """item type; part type; artikeltyp; materialart; teileart""",
+    Heading.SOURCING: """sourcing; sourcing type; procurement; make or buy; make buy; beschaffung;
+        beschaffungsart; purchaseable; purchasable; bought""",
 }
+
+_LONGEST = 500  # characters: what follows is no heading
 
 BRACKET = re.compile(r"[\(\[（【<]\s*([^)\]）】>]*)\s*[\)\]）】>]")
 """A remark in brackets, a unit more often than not: its first group is what stands in them."""
@@ -139,7 +172,7 @@ BRACKET = re.compile(r"[\(\[（【<]\s*([^)\]）】>]*)\s*[\)\]）】>]")
 
 def normal(header: str) -> str:
     """Return a header in lower case, without punctuation, text in brackets and double spaces."""
-    text = unicodedata.normalize("NFKC", header).casefold()
+    text = unicodedata.normalize("NFKC", header[:_LONGEST]).casefold()
     text = BRACKET.sub(" ", text)
     return " ".join(re.sub(r"[\W_]+", " ", text).split())
 
@@ -176,44 +209,6 @@ def second_columns(
     """Return the columns that have the same role as a used column (``at``)."""
     columns_by_role = ((alias(normal(cell)), index) for index, cell in enumerate(header))
     return [(of[0], i) for of, i in columns_by_role if of and of[0] in roles and at.get(of[0], i) != i]
-
-
-@dataclass(frozen=True, slots=True)
-class Clash:
-    """Two columns of one meaning that differ in a row: index of that row, and both texts."""
-
-    role: Heading
-    ours: str
-    other: str
-    row: int
-    used: str
-    unused: str
-
-
-def find_clashes(
-    header: Sequence[str],
-    rows: Sequence[Sequence[str]],
-    at: Mapping[Heading, int],
-    seconds: Iterable[tuple[Heading, int]],
-    is_empty: Callable[[str], bool] = lambda text: not text,
-) -> list[Clash]:
-    """Make a clash for each of the ``seconds`` that differs from the used column (``at``)."""
-    return [
-        Clash(role, header[at[role]].strip(), header[index].strip(), number, used, unused)
-        for role, index in seconds
-        for number, used, unused in _differences(rows, at[role], index, is_empty)
-    ]
-
-
-def _differences(
-    rows: Sequence[Sequence[str]], used: int, other: int, is_empty: Callable[[str], bool]
-) -> list[tuple[int, str, str]]:
-    """Return the first row in which the columns differ; [] if none does."""
-    for number, cells in enumerate(rows):
-        ours, theirs = (plain_cell(cells[i].strip()) if i < len(cells) else "" for i in (used, other))
-        if not is_empty(theirs) and theirs != ours:
-            return [(number, ours, theirs)]
-    return []
 
 
 def missing_columns(header: Sequence[str], at: Mapping[Heading, int], needed: Sequence[Heading]) -> str:

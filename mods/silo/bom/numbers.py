@@ -146,7 +146,8 @@ def read_number(text: str, mark: Mark | None = None, *, points_are_decimal: bool
 
 def read_count(text: str, mark: Mark | None = None, *, points_are_decimal: bool = False) -> NumberReading:
     """Read a number as :func:`read_number` does; the text may name the unit: "4 pcs", "4x", "4 Stk."."""
-    counted = _COUNT_WORD.fullmatch(text.strip())
+    short = text.strip()
+    counted = _COUNT_WORD.fullmatch(short) if len(short) <= 2 * LONGEST else None
     return read_number(counted["number"] if counted else text, mark, points_are_decimal=points_are_decimal)
 
 

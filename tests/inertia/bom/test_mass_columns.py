@@ -109,9 +109,10 @@ CASES = {
     "points in all masses are no doubt": (
         "Name,Mass,Material\na,1.234 kg,\nb,2.345 kg,\n", {"a": 1.234, "b": 2.345}, []
     ),
-    "rows that do not fit the header": (
-        "Name,Material,Mass\nBolt, long,steel,0.1 kg\nnut,steel\n", {"Bolt": None, "nut": None},
-        [(BomCode.ROW_LENGTH, 2), (BomCode.UNREADABLE_MASS, 2), (BomCode.ROW_LENGTH, 3)],
+    "a row that ends early": ("Name,Material,Mass\nnut,steel\n", {"nut": None}, [(BomCode.ROW_LENGTH, 2)]),
+    "a sum and what is not fitted": (
+        "Name,Material,Qty,DNP,Mass\nnut,steel,1,no,1 kg\npin,steel,1,ja,1 kg\nSumme,,2,,2 kg\n", {"nut": 1},
+        [(BomCode.LEFT_OUT, 3), (BomCode.LEFT_OUT, 4)],
     ),
     "a total at the bottom is no part": (
         "Name,Material,Mass\nnut,steel,1 kg\n,,7 kg\n", {"nut": 1}, [(BomCode.NO_NAME, 3)]

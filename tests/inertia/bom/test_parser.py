@@ -13,10 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.bom.errors import InputError
-from silo.inertia.bom.columns import find_columns
+from silo.inertia.bom.columns import MASSES
 from silo.inertia.bom.mass_cell import unit_factor
 from silo.inertia.bom.parser import BOMParser
 from silo.inertia.bom.table import BomCode, BomTable
+from silo.tables.columns import find_columns
 
 PLAIN = (
     "Item,Quantity,Part number,Description,Material,Mass,Name\n"
@@ -243,8 +244,15 @@ def test_names_with_commas_quotes_and_newlines(bom: Callable[..., BomTable]) -> 
 
 def test_a_quote_that_is_never_closed_is_reported(bom: Callable[..., BomTable]) -> None:
     """It swallows the rows below it; that must not look like a short BOM."""
-    table = bom('Name,Material,Mass\nnut,steel,1 kg\n"bolt,steel,1 kg\npin,steel,1 kg\n')
-    assert any("quotes do not match" in w.message and "line 3" in w.message for w in table.warnings)
+    with pytest.raises(InputError, match=r"line 3 cannot be read as CSV: its quotes do not match"):
+        bom('Name,Material,Mass\nnut,steel,1 kg\n"bolt,steel,1 kg\npin,steel,1 kg\n')
+
+
+def test_a_row_with_more_cells_than_the_header_is_refused(bom: Callable[..., BomTable]) -> None:
+    """A comma without quotes shifts the columns: no cell of such a row can be trusted."""
+    with pytest.raises(InputError) as error:
+        bom("Name,Material,Mass\nBolt, long,steel,0.1 kg\nnut,steel,1 kg\nPin, x,steel,0.1 kg\n")
+    assert [problem.partition(":")[0] for problem in error.value.problems] == ["line 2", "line 4"]
 
 
 @pytest.mark.parametrize("data", [b"", b"\n\n", b"a,b\n1,2\n", bytes(range(256)), b"\x00\x01\x02" * 50])
@@ -356,7 +364,7 @@ def test_the_servers_real_export_is_read() -> None:
 )
 def test_headers_of_cad_systems_are_known(header: str, found: str) -> None:
     cells = header.split(";")
-    columns = find_columns(cells)
+    columns = find_columns(cells, MASSES)
     roles = {index: role for role, index in columns.at.items()}
     assert [str(roles.get(index, "-")) for index in range(len(cells))] == found.split()
 

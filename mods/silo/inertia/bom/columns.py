@@ -1,15 +1,20 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The role of each column of a BOM: by :mod:`silo.bom.headers`, by its mass header, or by the user's word."""
+"""The table of a mass calculation: what its columns mean, by :mod:`silo.bom.headers` and by their mass
+headers.
+"""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-from silo.bom.errors import InputError
-from silo.bom.headers import Heading, alias, normal, plain_cell
+from silo.bom.headers import Heading, alias, normal
 from silo.inertia.bom.mass_header import MassHeader, read_mass_header
+from silo.tables.columns import Columns
+from silo.tables.kind import TableKind
+from silo.tables.sheet import Sheet
+from silo.workbook.sheet import SheetRow
 
 ROLES = (
     *(
@@ -27,6 +32,8 @@ ROLES = (
         Heading.FIND_NUMBER,
         Heading.MASS_UNIT,
         Heading.UNIT,
+        Heading.NOT_FITTED,
+        Heading.FITTED,
     ),
 )
 """What a mass calculation reads of a BOM."""
@@ -41,70 +48,48 @@ _SILOS_OWN = {"part number", "total quantity", "unreferenced since"}
 
 
 @dataclass(frozen=True, slots=True)
-class Columns:
-    """Where each role is (column index), and what the headers of the mass columns say.
+class MassColumns:
+    """What the headings of the mass columns say.
 
-    others
-        columns that mean a quantity, a mass or a material as well, and lost to the one that is used.
+    masses
+        role → its header.
     unused
         columns that may hold masses by their headers, and whose role nobody knows.
     exact
         masses are written in full (Silo's own export does so): a short one was not rounded.
     """
 
-    at: Mapping[Heading, int]
-    masses: Mapping[Heading, MassHeader]
-    others: tuple[tuple[Heading, int], ...]
+    masses: Mapping[str, MassHeader]
     unused: tuple[int, ...]
     exact: bool
 
-    def cell(self, row: Sequence[str], role: Heading) -> str:
-        """Return the row's cell for a role; "" if there is no such column or the row is too short.
 
-        An apostrophe that keeps a spreadsheet from running the cell as a formula is no part of it.
-        """
-        index = self.at.get(role)
-        return plain_cell(row[index].strip()) if index is not None and index < len(row) else ""
+def mass_columns(sheet: Sheet) -> MassColumns:
+    """Read the headings of a table's mass columns."""
+    at = sheet.columns.at
+    masses = {str(role): read_mass_header(sheet.header[at[role]]) for role in MASS_COLUMNS if role in at}
+    unused = tuple(
+        index
+        for index, cell in enumerate(sheet.header)
+        if index not in at.values() and _role_of(cell) is None and read_mass_header(cell).names_masses
+    )
+    return MassColumns(masses, unused, {*map(normal, sheet.header)} >= _SILOS_OWN)
 
-    @property
-    def usable(self) -> bool:
-        """Return True if rows can be distinguished: by name, part number or description."""
-        return not self.at.keys().isdisjoint(NAMING)
 
-
-def find_columns(header: Sequence[str], given: Mapping[str, str] | None = None) -> Columns:
-    """Find the roles of a header line. ``given``: role → header text, from the user; it wins over aliases.
-
-    If two columns fit a role, the column whose name fits better gets it, then the first. Raises InputError
-    for a role that does not exist.
-    """
-    unknown = sorted((given or {}).keys() - ROLES)
-    if unknown:
-        raise InputError(
-            f"unknown column role {', '.join(unknown)}; the roles are {', '.join(sorted(ROLES))}"
-        )
-    wanted = {Heading(role): normal(text) for role, text in (given or {}).items()}
-    plain = [normal(cell) for cell in header]
-    at = {role: plain.index(text) for role, text in wanted.items() if text in plain}
-    taken = set(at.values())
-    best: dict[Heading, int] = {}
-    seen: list[tuple[Heading, int]] = []
-    unused: list[int] = []
-    for index, cell in enumerate(header):
-        role_here = _role_of(cell)
-        if index in taken:
-            continue
-        if role_here is None:
-            if read_mass_header(cell).names_masses:
-                unused.append(index)
-        elif role_here[0] not in wanted:
-            role, rank = role_here
-            seen.append((role, index))
-            if rank < best.get(role, sys.maxsize):
-                at[role], best[role] = index, rank
-    masses = {role: read_mass_header(header[at[role]]) for role in MASS_COLUMNS if role in at}
-    others = tuple((role, i) for role, i in seen if role in _ONE_ONLY and at[role] != i)
-    return Columns(at, masses, others, tuple(unused), set(plain) >= _SILOS_OWN)
+def continues(header: SheetRow, columns: Columns, below: SheetRow) -> bool:
+    """Return True if the line below a heading is its second one: it names no part, and units of masses."""
+    if any(columns.cell(below.cells, role) for role in NAMING):
+        return False
+    if any(letter.isdigit() for cell in below.cells for letter in cell):
+        return False
+    places = [columns.at[role] for role in MASS_COLUMNS if role in columns.at]
+    read = [
+        read_mass_header(f"mass ({cell.strip('[](){} ')})")
+        for place in places
+        for cell in below.cells[place : place + 1]
+        if any(map(str.isalpha, cell))
+    ]
+    return bool(read) and not any(mass_header.strange or mass_header.rate for mass_header in read)
 
 
 def _role_of(cell: str) -> tuple[Heading, int] | None:
@@ -119,3 +104,7 @@ def _role_of(cell: str) -> tuple[Heading, int] | None:
     if role is None or role[0] not in MASS_COLUMNS or header.rate:
         return None
     return (Heading.TOTAL_MASS, role[1]) if header.total else role
+
+
+MASSES = TableKind(roles=ROLES, naming=NAMING, single=_ONE_ONLY, role_of=_role_of, any_name=True)
+"""The table of a mass calculation."""

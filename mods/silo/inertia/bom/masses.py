@@ -11,10 +11,10 @@ from dataclasses import replace
 
 from silo.bom.headers import Heading
 from silo.bom.numbers import Mark
-from silo.inertia.bom.columns import MASS_COLUMNS
+from silo.inertia.bom.columns import MASS_COLUMNS, mass_columns
 from silo.inertia.bom.mass_cell import FORCE_UNITS, MassCell, column_mark, parse_mass, unit_factor
-from silo.inertia.bom.sheet import Sheet
 from silo.inertia.bom.table import BomCode, BOMEntry, BomTable, BomWarning
+from silo.tables.sheet import Sheet
 from silo.workbook.sheet import SheetRow
 
 _TOTAL_TOLERANCE = 1e-3
@@ -30,6 +30,7 @@ class MassReader:
 
     def __init__(self, sheet: Sheet, mark: Mark | None, unit: str | None, warnings: list[BomWarning]) -> None:
         self._columns = sheet.columns
+        self._headers = mass_columns(sheet)
         self._warnings = warnings
         self._unit = unit
         self._marks = {
@@ -52,7 +53,7 @@ class MassReader:
         if (
             Heading.MASS_UNIT in at
             or Heading.UNIT not in at
-            or any(h.unit for h in sheet.columns.masses.values())
+            or any(h.unit for h in self._headers.masses.values())
         ):
             return Heading.MASS_UNIT
         bare = [row for row in sheet.rows if any(cell(row.cells, role) for role in MASS_COLUMNS)]
@@ -93,7 +94,7 @@ class MassReader:
 
         If a column has "0.009 kg", its "0.3 kg" had three decimals as well, so that it is ± 0.0005 kg.
         """
-        if self._columns.exact:
+        if self._headers.exact:
             return [replace(row, quantum_kg=0.0) for row in rows]
         finest: dict[str, float] = {}
         for row in rows:
@@ -112,7 +113,7 @@ class MassReader:
         return self._cells[row.line][0].kg is not None
 
     def _cell(self, role: Heading, row: SheetRow, name: str) -> MassCell:
-        header = self._columns.masses.get(role)
+        header = self._headers.masses.get(role)
         if header is None:
             return MassCell()
         text = self._columns.cell(row.cells, role)

@@ -8,13 +8,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from silo.bom.errors import InputError, counted
-from silo.bom.headers import Heading, find_clashes
+from silo.bom.headers import Heading
 from silo.bom.numbers import Mark, read_count
 from silo.bom.quantities import LARGEST_QUANTITY
+from silo.inertia.bom.columns import MASSES, NAMING, MassColumns, continues, mass_columns
 from silo.inertia.bom.mass_cell import is_empty, parse_mass, unit_factor
 from silo.inertia.bom.mass_header import read_mass_header
 from silo.inertia.bom.masses import MassReader
-from silo.inertia.bom.sheet import Sheet, read_sheet
 from silo.inertia.bom.structure import (
     doubtful_items,
     item_role_of,
@@ -23,6 +23,10 @@ from silo.inertia.bom.structure import (
     with_structure,
 )
 from silo.inertia.bom.table import BomCode, BOMEntry, BomTable, BomWarning
+from silo.tables.clashes import find_clashes
+from silo.tables.sheet import Sheet, read_sheet
+from silo.tables.totals import is_total
+from silo.tables.yes_no import empty_means_fitted, is_fitted
 from silo.workbook.sheet import SheetRow
 
 
@@ -75,21 +79,54 @@ class BOMParser:
         sheet = read_sheet(
             data,
             source,
+            MASSES,
             columns=self._columns,
             encoding=self._encoding,
             delimiter=self._delimiter,
+            continues=continues,
         )
         warnings = [BomWarning(BomCode.FILE, note) for note in sheet.notes]
-        warnings += _doubtful_columns(sheet)
+        warnings += _doubtful_columns(sheet, mass_columns(sheet))
         warnings += _second_columns(sheet)
         masses = MassReader(sheet, self._decimal, self._mass_unit, warnings)
         item_role = item_role_of(sheet)
-        entries = [_entry(sheet, row, masses, item_role, warnings) for row in sheet.rows]
+        counted_rows = [row for row in sheet.rows if _is_counted(sheet, row, warnings)]
+        entries = [_entry(sheet, row, masses, item_role, warnings) for row in counted_rows]
         rows = with_levels_of_indents([entry for entry in entries if entry is not None], sheet, warnings)
         table_rows = masses.check_totals(BomTable(with_structure(masses.to_display_precision(rows))))
         warnings += doubtful_items(table_rows)
         warnings += _duplicates(table_rows)
         return BomTable(table_rows, tuple(warnings), source)
+
+
+def _is_counted(sheet: Sheet, row: SheetRow, warnings: list[BomWarning]) -> bool:
+    """Return False for a sum below the table, and for a part that is not fitted; the warnings name both."""
+    cell = sheet.columns.cell
+    names = [cell(row.cells, role) for role in NAMING]
+    name = next(filter(None, names), "")
+    if is_total(names, row.cells):
+        warnings.append(BomWarning(BomCode.LEFT_OUT, "is a sum and no part; it was left out", row.line, name))
+        return False
+    for role in (Heading.NOT_FITTED, Heading.FITTED):
+        text = cell(row.cells, role)
+        if role not in sheet.columns.at or (role is Heading.FITTED and not text):
+            continue
+        title = sheet.header[sheet.columns.at[role]].strip()
+        fitted = is_fitted(text, by_absence=role is Heading.NOT_FITTED)
+        if fitted is None:
+            words = f"“{text}” under “{title}” is neither yes nor no; the row was read as fitted"
+            warnings.append(BomWarning(BomCode.FILE, words, row.line, name))
+        elif not fitted:
+            words = f"is not fitted (“{title}” is “{text}”); it was left out"
+            warnings.append(BomWarning(BomCode.LEFT_OUT, words, row.line, name))
+            return False
+    if Heading.FITTED in sheet.columns.at and not cell(row.cells, Heading.FITTED):
+        texts = [cell(other.cells, Heading.FITTED) for other in sheet.rows]
+        if not empty_means_fitted(texts):
+            title = sheet.header[sheet.columns.at[Heading.FITTED]].strip()
+            words = f"“{title}” is empty here and not elsewhere; the row was read as fitted"
+            warnings.append(BomWarning(BomCode.FILE, words, row.line, name))
+    return True
 
 
 def _entry(
@@ -134,38 +171,32 @@ def _quantity(text: str, line: int, name: str, warnings: list[BomWarning]) -> fl
 
 
 def _check_length(sheet: Sheet, row: SheetRow, name: str, warnings: list[BomWarning]) -> None:
-    if not sheet.delimiter:
-        return  # a workbook's cells have fixed places
-    if any(cell.strip() for cell in row.cells[len(sheet.header) :]):
-        what = "a comma without quotes shifts the columns"
-    elif len(row.cells) <= max(sheet.columns.at.values()):
-        what = "the missing ones count as empty"
-    else:
-        return
-    words = f"has {counted(len(row.cells), 'cell')}, and the header has {len(sheet.header)}; {what}"
-    warnings.append(BomWarning(BomCode.ROW_LENGTH, words, row.line, name))
+    if sheet.delimiter and len(row.cells) <= max(sheet.columns.at.values()):
+        words = f"has {counted(len(row.cells), 'cell')}, and the header has {len(sheet.header)}; "
+        words += "the missing ones count as empty"
+        warnings.append(BomWarning(BomCode.ROW_LENGTH, words, row.line, name))
 
 
-def _doubtful_columns(sheet: Sheet) -> Iterator[BomWarning]:
+def _doubtful_columns(sheet: Sheet, headers: MassColumns) -> Iterator[BomWarning]:
     at = sheet.columns.at
-    for role, header in sheet.columns.masses.items():
+    for role, header in headers.masses.items():
         if header.rate:
             words = f"“{sheet.header[at[role]].strip()}” is no mass by its header, and was used as one"
             yield BomWarning(BomCode.FILE, words, sheet.header_line)
     seen = ", ".join(cell.strip() for cell in sheet.header if cell.strip())
     unused = [
         index
-        for index in sheet.columns.unused
+        for index in headers.unused
         if any(parse_mass(cell).kg is not None for row in sheet.rows for cell in row.cells[index : index + 1])
     ]
     titles = [sheet.header[index].strip() for index in unused]
-    for what, is_role_known in (("mass", sheet.columns.masses), ("material", Heading.MATERIAL in at)):
+    for what, is_role_known in (("mass", headers.masses), ("material", Heading.MATERIAL in at)):
         if not is_role_known:
             title = titles[0] if what == "mass" and titles else "…"
             words = f"there is no {what} column (the columns are {seen}); "
             words += f'if one of them is it, say --column "{what}={title}"'
             yield BomWarning(BomCode.MISSING_COLUMN, words, sheet.header_line)
-    for title in titles if sheet.columns.masses else ():
+    for title in titles if headers.masses else ():
         words = f'the column “{title}” may hold masses, and was not used; --column "mass={title}" takes it'
         if read_mass_header(title).rate:
             words = f"the column “{title}” holds no masses of one piece, and was not used"

@@ -13,6 +13,7 @@ class BomCode(StrEnum):
 
     FILE = "bom_file"  # how the file had to be read
     NO_NAME = "bom_row_without_name"
+    LEFT_OUT = "bom_row_left_out"  # a sum, or a part that is not fitted
     ROW_LENGTH = "bom_row_length"
     DUPLICATE_NAME = "bom_duplicate_name"
     UNREADABLE_MASS = "bom_mass_unreadable"

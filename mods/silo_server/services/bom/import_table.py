@@ -21,13 +21,13 @@ from silo.bom.errors import InputError, RejectedError, listed
 from silo.bom.headers import (
     Heading,
     designators,
-    find_clashes,
     find_roles,
     missing_columns,
     plain_cell,
     second_columns,
 )
 from silo.bom.numbers import Mark, common_mark, parse_number, read_quantity
+from silo.tables.clashes import find_clashes
 from silo.workbook.encoding import STARTS, unicode_name
 from silo.workbook.read import read_workbook
 from silo.workbook.sheet import Grid
@@ -287,7 +287,7 @@ def _refuse_clashes(
     problems = [
         f"the columns '{clash.ours}' and '{clash.other}' both mean the {words}, and "
         f"in row {layout.header + 2 + clash.row} they say {clash.used[:40]!r} and {clash.unused[:40]!r}"
-        for clash in find_clashes(header, body, layout.columns, seconds)
+        for clash in find_clashes(header, body, {str(r): i for r, i in layout.columns.items()}, seconds)
         for words in [clash.role.replace("_", " ")]
     ]
     if problems:

@@ -1,0 +1,339 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The table in a CSV export or a workbook: its heading, and its rows with their line numbers.
+
+A separator is right if a line under it reads as the heading of such a table; nothing is concluded from
+counting commas. A heading may have two lines ("Price" over "EUR"; "Part" over "Number" and "Name"). A row
+of a CSV file with more cells than the heading is refused with its line, since a mark without quotes shifted
+its columns; cells that are missing at the end are empty.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from itertools import zip_longest
+
+from silo.bom.errors import InputError, counted
+from silo.bom.headers import Heading, missing_columns
+from silo.bom.numbers import parse_number
+from silo.tables import limits
+from silo.tables.as_shown import as_shown
+from silo.tables.columns import Assigned, Columns, find_columns
+from silo.tables.csv_text import DELIMITERS, decodings, first_records, read_records
+from silo.tables.heading_detail import price_heading, quantity_unit
+from silo.tables.kind import TableKind
+from silo.workbook.encoding import STARTS
+from silo.workbook.read import read_workbook
+from silo.workbook.sheet import Grid, SheetRow
+
+Continues = Callable[[SheetRow, Columns, SheetRow], bool]
+"""Says if the line below a heading belongs to it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sheet:
+    """A decoded table; a workbook has no ``delimiter``.
+
+    header, header_line
+        the heading, both lines of it joined, and the line of the file on which it begins.
+    notes
+        what had to be assumed to read it.
+    hidden, struck, other_sheets
+        lines of the workbook that are hidden or struck out; names of its other sheets with such a table.
+    """
+
+    header: tuple[str, ...]
+    header_line: int
+    columns: Columns
+    rows: tuple[SheetRow, ...]
+    delimiter: str
+    notes: tuple[str, ...] = ()
+    hidden: tuple[int, ...] = ()
+    struck: tuple[int, ...] = ()
+    other_sheets: tuple[str, ...] = ()
+
+    @property
+    def unused(self) -> list[str]:
+        """Return the titles of the columns that hold something and have no role."""
+        used = self.columns.used
+        filled = {i for row in self.rows for i, cell in enumerate(row.cells) if cell and not cell.isspace()}
+        filled |= {index for index, title in enumerate(self.header) if title.strip()}
+        unused = []
+        for index in sorted(filled - used):
+            title = self.header[index].strip() if index < len(self.header) else ""
+            unused.append(title or f"column {index + 1}, which has no heading")
+        return unused
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """How the user says that a file is read. ``header``: index of the heading among the file's records."""
+
+    delimiter: str
+    header: int
+    columns: Assigned
+
+
+@dataclass(frozen=True, slots=True)
+class _Header:
+    delimiter: str
+    index: int
+    lines: int
+    header: SheetRow
+    columns: Columns
+
+
+def read_sheet(
+    data: bytes,
+    source: str,
+    kind: TableKind,
+    *,
+    columns: Assigned | None = None,
+    layout: Layout | None = None,
+    encoding: str | None = None,
+    delimiter: str | None = None,
+    continues: Continues | None = None,
+) -> Sheet:
+    """Decode a CSV export, or the first sheet of a workbook that holds such a table.
+
+    ``columns``, ``layout``, ``encoding``, ``delimiter``: given by the user, else detected. ``continues``: see
+    :data:`Continues`.
+
+    Raises InputError if there is no heading, if a row is longer than the heading, if quotes do not match,
+    or if the given encoding does not fit.
+    """
+    if len(data) > limits.MOST_BYTES:
+        raise InputError(
+            f"{source}: {len(data) / 1e6:.0f} MB is too large for a table "
+            f"(limit {limits.MOST_BYTES / 1e6:.0f} MB)"
+        )
+    if delimiter is not None and len(delimiter) != 1:
+        raise InputError(f"a delimiter is one character, got “{delimiter}”")
+    if data.startswith(STARTS):
+        return _from_workbook(data, source, kind, columns, layout, continues)
+    first_lines: list[str] = []
+    near = ""
+    for name, text in decodings(data, encoding, source, kind.code_pages):
+        if text.lstrip()[:1] == "<":
+            raise InputError(f"{source}: this is HTML or XML and no table; export it as CSV or XLSX")
+        first_lines = first_lines or text.splitlines()
+        if layout is not None:
+            records = read_records(text, layout.delimiter, source)
+            best = _chosen(records, kind, layout, source)
+        else:
+            tables = [(mark, first_records(text, mark)) for mark in delimiter or DELIMITERS]
+            found = _best_header(tables, kind, columns)
+            if found is None:
+                near = near or _near(tables, kind)
+                continue
+            best, records = found, read_records(text, found.delimiter, source)
+        notes = []
+        if name in kind.code_pages and not data.isascii():
+            notes.append(
+                f"the file is not UTF-8; it was read as {name}. If names look wrong, "
+                "export it as UTF-8 or say which encoding it has"
+            )
+        return _sheet(records, best, kind, columns, notes, source, continues)
+    raise InputError(f"{source}: {near or _no_header(first_lines, kind)}")
+
+
+def _from_workbook(
+    data: bytes,
+    source: str,
+    kind: TableKind,
+    columns: Assigned | None,
+    layout: Layout | None,
+    continues: Continues | None,
+) -> Sheet:
+    sheets = [(grid, grid.rows()) for grid in read_workbook(data, source)]
+    if layout is not None:
+        if not sheets:
+            raise InputError(f"{source}: wanted a workbook with a table, got one without a sheet")
+        usable = [(*sheets[0], _chosen(sheets[0][1], kind, layout, source))]
+    else:
+        usable = [
+            (grid, rows, best)
+            for grid, rows in sheets
+            if (best := _best_header([("", rows[: limits.HEADER_WITHIN])], kind, columns)) is not None
+        ]
+    if not usable:
+        near = _near([("", rows[: limits.HEADER_WITHIN]) for _, rows in sheets], kind)
+        lines = [", ".join(row.cells) for _, rows in sheets for row in rows]
+        raise InputError(f"{source}: {near or _no_header(lines, kind)}")
+    notes = []
+    others = tuple(grid.name for grid, _, _ in usable[1:])
+    if others:
+        names = ", ".join(f"sheet “{name}”" for name in others)
+        notes = [f"sheet “{usable[0][0].name}” of the workbook was read; not read: {names}"]
+    grid, rows, best = usable[0]
+    return _sheet(rows, best, kind, columns, notes, source, continues, grid, others)
+
+
+def _chosen(records: Sequence[SheetRow], kind: TableKind, layout: Layout, source: str) -> _Header:
+    header = records[layout.header] if layout.header < len(records) else SheetRow(1, ())
+    columns = find_columns(header.cells, kind, layout.columns)
+    if missing := kind.lacking(columns.at.keys() | {*kind.instead.get(kind.naming[0], ())} & _named(columns)):
+        words = ", ".join(role.replace("_", " ").capitalize() for role in missing)
+        raise InputError(f"{source}: choose the column of {words}")
+    return _Header(layout.delimiter, layout.header, 1, header, columns)
+
+
+def _named(columns: Columns) -> set[str]:
+    """Return what the user may choose in place of a number: the names of the parts."""
+    return {Heading.MANUFACTURER_NUMBER, Heading.VALUE} if Heading.NAME in columns.at else set()
+
+
+def _sheet(
+    records: list[SheetRow],
+    best: _Header,
+    kind: TableKind,
+    given: Assigned | None,
+    notes: list[str],
+    source: str,
+    continues: Continues | None,
+    grid: Grid | None = None,
+    others: tuple[str, ...] = (),
+) -> Sheet:
+    header, columns, first = best.header, best.columns, best.index + best.lines
+    below = records[first] if first < len(records) else None
+    is_single = best.lines == 1 and not columns.chosen
+    if (
+        below is not None
+        and is_single
+        and (
+            _is_second_line(header, columns, below, kind) or (continues and continues(header, columns, below))
+        )
+    ):
+        header = _joined(header, below, brackets=True)
+        columns, first = find_columns(header.cells, kind, given), first + 1
+    seen = ", ".join(cell.strip() for cell in header.cells if cell.strip())
+    notes += [
+        f"there is no column “{text}” for {role} in line {header.line} ({seen})"
+        for role, text in (given or {}).items()
+        if role not in columns.at
+    ]
+    hidden: tuple[int, ...] = ()
+    struck: tuple[int, ...] = ()
+    if grid is not None:
+        shown = as_shown(records, grid, header, sorted(columns.used))
+        records, hidden, struck = shown.records, shown.hidden, shown.struck
+        notes += shown.notes
+    rows = tuple(
+        row
+        for row in records[first:]
+        if any(map(str.strip, row.cells)) and row.cells != records[best.index].cells
+    )
+    if grid is None:
+        _refuse_long(rows, len(header.cells), source)
+    return Sheet(
+        header.cells, header.line, columns, rows, best.delimiter, tuple(notes), hidden, struck, others
+    )
+
+
+def _refuse_long(rows: Sequence[SheetRow], width: int, source: str) -> None:
+    long = [row for row in rows if any(cell.strip() for cell in row.cells[width:])]
+    if long:
+        problems = [
+            f"line {row.line}: wanted {counted(width, 'cell')} as in the heading, got "
+            f"{counted(len(row.cells), 'cell')}; a comma or semicolon without quotes shifts the columns"
+            for row in long
+        ]
+        raise InputError(f"{source}: {problems[0]}", problems)
+
+
+def _is_second_line(header: SheetRow, columns: Columns, below: SheetRow, kind: TableKind) -> bool:
+    """Return True if the line below says more about columns above it, and names no part: units, prices'
+    quantities.
+    """
+    if any(columns.cell(below.cells, role) for role in kind.naming):
+        return False
+    joined = _joined(header, below, brackets=True).cells
+    texts = [(index, cell.strip()) for index, cell in enumerate(below.cells) if cell.strip()]
+    return bool(texts) and all(_understood(joined[index], kind) for index, _ in texts)
+
+
+def _understood(title: str, kind: TableKind) -> bool:
+    price = price_heading(title) if Heading.PRICE in kind.roles else None
+    if price is not None:
+        return not price.strange
+    role = kind.role_of(title)
+    return role is not None and role[0] == Heading.QUANTITY and bool(quantity_unit(title))
+
+
+def _joined(header: SheetRow, below: SheetRow, *, brackets: bool) -> SheetRow:
+    """Join two lines of a heading: a merged cell has its text in the first of its columns."""
+    filled = [next(filter(None, reversed(header.cells[: i + 1])), "") for i in range(len(header.cells))]
+    filled += [filled[-1] if filled else ""] * (len(below.cells) - len(filled))
+    cells = [
+        (f"{above} ({under})" if brackets else f"{above} {under}".strip()) if under.strip() else own
+        for above, own, under in zip_longest(filled, header.cells, below.cells, fillvalue="")
+    ]
+    return SheetRow(header.line, tuple(cells))
+
+
+def _best_header(
+    tables: Iterable[tuple[str, Sequence[SheetRow]]], kind: TableKind, given: Assigned | None
+) -> _Header | None:
+    """Find the (delimiter, line) that names most roles; None if no line names what the table needs."""
+    best: _Header | None = None
+    score = (0, 0, 0)
+    for delimiter, rows in tables:
+        for index, row in enumerate(rows):
+            if any(len(cell) > limits.LONGEST_HEADING for cell in row.cells):
+                continue
+            columns = find_columns(row.cells, kind, given)
+            # A column of its own beside the name keeps a title ("Name") from passing as a header, unless
+            # the file has that one column only.
+            single = len([cell for cell in row.cells if cell.strip()]) == 1
+            if kind.complete(columns.at.keys()):
+                here = (1, len(columns.at), -index)
+                if here > score and (len(columns.at) > 1 or single):
+                    best, score = _Header(delimiter, index, 1, row, columns), here
+            elif pair := _two_lines(rows[index : index + 2], kind, given):
+                here = (0, len(pair[1].at), -index)
+                if here > score:
+                    best, score = _Header(delimiter, index, 2, *pair), here
+    return best
+
+
+def _two_lines(
+    rows: Sequence[SheetRow], kind: TableKind, given: Assigned | None
+) -> tuple[SheetRow, Columns] | None:
+    """Read two lines as one heading, if neither is one alone: "Part" over "Number" and "Name"."""
+    if len(rows) < 2 or any(parse_number(cell) for cell in rows[1].cells):
+        return None
+    if kind.complete(find_columns(rows[1].cells, kind, given).at.keys()):
+        return None
+    header = _joined(rows[0], rows[1], brackets=False)
+    alone = [cell if kind.role_of(cell) else under or cell for cell, under in zip_longest(
+        header.cells, rows[1].cells, fillvalue="")]  # fmt: skip
+    columns = find_columns(alone, kind, given)
+    return (SheetRow(header.line, tuple(alone)), columns) if kind.complete(columns.at.keys()) else None
+
+
+def _near(tables: Iterable[tuple[str, Sequence[SheetRow]]], kind: TableKind) -> str:
+    """Say which needed column a line lacks that has another needed one; "" if no line does."""
+    for _, rows in tables:
+        for row in rows:
+            at = find_columns(row.cells, kind).at
+            if len(row.cells) > 1 and {*kind.needed} & at.keys():
+                lacking = [Heading(role) for role in kind.lacking(at)]
+                known = {Heading(role): place for role, place in at.items()}
+                return f"in line {row.line}, {missing_columns(row.cells, known, lacking)}"
+    return ""
+
+
+def _no_header(text: Sequence[str], kind: TableKind) -> str:
+    lines = [line.strip() for line in text if line.strip()][:3]
+    needed = ", ".join(role.replace("_", " ").capitalize() for role in kind.needed)
+    wanted = (
+        f"a header line with {needed}" if needed else "a header line with a column of names or part numbers"
+    )
+    if not lines:
+        return f"the file is empty; wanted {wanted}, and rows"
+    seen = "; ".join(f"“{line[:80]}”" for line in lines)
+    words = f"found no {wanted.removeprefix('a ')} among the first {limits.HEADER_WITHIN} lines. "
+    words += f"The file begins with {seen}"
+    if kind.any_name:
+        words += ". Name the columns yourself, for example: --column name=Bauteil --column mass=Gewicht"
+    return words
