@@ -365,6 +365,3 @@ def register_standard(
     except SiloError as error:
         return Registration(proposal, error=error)
     return Registration(proposal, part_number=str(item["part_number"]), item_id=item_id, found=existing)
-
-
-"""In a component's folder: what is begun there and not finished, for other computers."""
