@@ -244,7 +244,7 @@ def test_what_was_held_without_a_number_is_out_of_date_by_its_identity(vault: Va
     vault.send(force=True)
     (waiting,) = vault.waiting()
     assert (waiting.part_number, waiting.superseded) == ("", True)
-    with pytest.raises(ConflictError, match="a newer commit of it was sent"):
+    with pytest.raises(ConflictError, match="a newer commit was sent; this one would overwrite it"):
         vault.outbox.retry(waiting.id)
 
 

@@ -216,7 +216,7 @@ def test_the_key_depends_on_content_name_options_and_kernel(
     assert key_of(renamed, same) != key_of(two, same)
     before = key_of(two, same)
     assert key_of(two, ReadOptions(mesh_check=False).content_options()) != before
-    monkeypatch.setattr(sys.modules["silo.inertia.geometry.read"], "KERNELS", ("numpy",))
+    monkeypatch.setattr(sys.modules["silo.inertia.geometry.cache"], "KERNELS", ("numpy",))
     assert key_of(two, same) != before
 
 
