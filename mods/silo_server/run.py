@@ -49,12 +49,14 @@ from silo_server.http.body_limit import BodyLimit
 from silo_server.http.compression import Compressed
 from silo_server.http.headers import SecurityHeaders
 from silo_server.http.request_log import Observed, log_to_stderr
+from silo_server.http.unknown_callers import UnknownCallers
 from silo_server.later import Later
 from silo_server.metrics import SHARED, Metrics
 from silo_server.probe import Probe
 from silo_server.services import search
 from silo_server.services.access.configured_token import check_configured_secret, take_configured_token
 from silo_server.services.access.login_links import create_login_link
+from silo_server.services.access.signing import ensure_signing_key
 from silo_server.services.access.tokens import START_TOKEN, create_token, shown_prefix
 from silo_server.services.access.users import User, create_user, get_user, make_admin, to_user
 from silo_server.services.file_store import FileStore
@@ -104,6 +106,7 @@ def prepare(db: Database, token: str | None = None, *, reset_admin: str | None =
             secret = None
         link = create_login_link(tx, admin.username) if admin else None
         search.ensure_index(tx)
+        ensure_signing_key(tx)
         last = tx.conn.scalar(select(events.c.at).order_by(events.c.id.desc()).limit(1)) or ""
         late = stamp(tx.at + timedelta(minutes=1))
     behind = f"The clock is behind: the last change is of {last}, and now it is {stamp(db.clock())}. Set it."
@@ -160,7 +163,7 @@ def routers() -> tuple[APIRouter, ...]:
 
 def create_app(settings: Settings, clock: Clock = utc_now) -> FastAPI:
     """Make the server as an ASGI application; :func:`prepare` has brought the database up to date."""
-    from silo_server.routes.call import Server
+    from silo_server.routes.call import Server, find_user
 
     db = Database(settings, clock)
 
@@ -200,6 +203,7 @@ def create_app(settings: Settings, clock: Clock = utc_now) -> FastAPI:
 
     pages.install(app)
     app.add_middleware(BodyLimit, settings=settings)
+    app.add_middleware(UnknownCallers, find_user=find_user)
     app.add_middleware(SecurityHeaders)
     app.add_middleware(Compressed)
     app.state.metrics = metrics

@@ -39,6 +39,9 @@ class Settings:
     public_url
         how users reach the server (``https://silo.example.com``), for links that are sent on. If it is
         not given: the address that the server listens on.
+    max_body_bytes, max_bodies_bytes
+        of one request that is no upload, and of all that are held in memory at a time; one user may hold
+        half of it.
     request_head_seconds, request_body_seconds
         how long a client may take to send a request; a body gets a second more for each 8 KiB of it.
     request_log
@@ -77,6 +80,7 @@ class Settings:
     audit_days: float = 0.0
     housekeeping_seconds: float = 600.0
     max_body_bytes: int = 16 * MIB
+    max_bodies_bytes: int = 128 * MIB
     max_file_bytes: int = 512 * MIB
     max_merge_entries: int = 20_000
     max_expanded_rows: int = 200_000
@@ -154,9 +158,17 @@ class Settings:
 _NAMES = (
     *("database_url", "read_only", "heartbeat_seconds", "event_log_size", "event_log_bytes", "sync_days"),
     *("sync_bytes", "history_days", "audit_days", "housekeeping_seconds", "max_body_bytes", "max_file_bytes"),
-    *("max_merge_entries", "secure_cookies", "request_log", "root_path", "trusted_proxies", "public_url"),
+    *(
+        "max_bodies_bytes",
+        "max_merge_entries",
+        "secure_cookies",
+        "request_log",
+        "root_path",
+        "trusted_proxies",
+        "public_url",
+    ),
     *("admin_username", "admin_password", "freecad_version", "release_labels", "release_approvals"),
-    "release_override",
+    *("release_override", "trusted_proxies"),
 )
 _ENVIRONMENT = {name: f"SILO_{name.upper()}" for name in _NAMES} | {"files_dir": "SILO_STORAGE_ROOT_DIR"}
 

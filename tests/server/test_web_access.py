@@ -17,10 +17,11 @@ from server_testing import Api, sqlite_database
 from starlette.datastructures import FormData
 from web_visitor import FORM, HTML, ROLES, Visitor, enter, link_of
 
-from silo_server.run import running_server
+from silo_server.run import RunningServer, running_server
+from silo_server.services.access.signing import signing_key
 from silo_server.settings import Settings
-from silo_server.web.forms import UnsentForm, kept_form, unpacked
 from silo_server.web.pages import ROUTERS
+from silo_server.web.unsent_form import MOST_KEPT, UnsentForm, read_signed, unsent_form
 
 TOKEN = "silo_pages"
 VIEWER, EDITOR, ADMIN = ROLES
@@ -201,7 +202,15 @@ def test_the_address_of_a_form_leads_to_its_page(visitors: dict[str, Visitor]) -
 SAME_SITE = {"Sec-Fetch-Site": "same-origin"}
 
 
-def test_a_form_of_ours_is_kept_over_the_login_and_another_site_s_is_not(api: Api) -> None:
+def _key(server: RunningServer) -> bytes:
+    """The secret by which the running server signs."""
+    with server.app.state.server.db.read() as tx:
+        return signing_key(tx)
+
+
+def test_a_form_of_ours_is_kept_over_the_login_and_another_site_s_is_not(
+    api: Api, server: RunningServer
+) -> None:
     """Its text travels in the login form; what another site sent is forgotten."""
     browser = api.as_(None)
     body = urlencode({"csrf_token": "old", "child": "X", "notes": "a <b> & c"}).encode()
@@ -210,7 +219,7 @@ def test_a_form_of_ours_is_kept_over_the_login_and_another_site_s_is_not(api: Ap
     ).body.decode()
     packed = re.search(r'name="kept" value="([^"]+)"', ours)
     assert packed is not None
-    kept = unpacked(packed[1])
+    kept = read_signed(packed[1], _key(server))
     assert kept is not None
     assert (kept.path, list(kept.fields)) == ("/items/X/bom/lines", [("child", "X"), ("notes", "a <b> & c")])
     for headers in ({}, {"Sec-Fetch-Site": "cross-site"}, {"Origin": "https://elsewhere.example"}):
@@ -237,32 +246,54 @@ def test_an_old_form_of_ours_is_shown_and_not_carried_out(visitors: dict[str, Vi
         assert "Send it now" not in answer.body.decode()
 
 
+KEY = b"k" * 32
+SIGNED = UnsentForm("/x", [("a", "b")]).signed(KEY)
+
+
 @pytest.mark.parametrize(
-    "packed",
+    "text",
     [
+        "",
+        ".",
         "%%%",
-        base64.b64encode(b"no zlib").decode(),
-        base64.b64encode(zlib.compress(b"[1, 2]")).decode(),
-        base64.b64encode(zlib.compress(b'["/x", [1], []]')).decode(),
-        base64.b64encode(zlib.compress(b" " * 17_000_000)).decode(),
-        base64.b64encode(zlib.compress(b"[" * 100_000)).decode(),
         "ü",
+        SIGNED.partition(".")[2],
+        "0" * 64 + "." + SIGNED.partition(".")[2],
+        SIGNED.replace(".", "", 1),
+        SIGNED[:-4],
+        UnsentForm("/x", [("a", "c")]).signed(b"another server's").rstrip("="),
+        base64.b64encode(zlib.compress(b'["/x", [], []]')).decode(),
+        "x" * 100_000,
     ],
 )
-def test_a_kept_form_that_was_tampered_with(api: Api, packed: str) -> None:
-    """It is forgotten; the login works."""
+def test_a_kept_form_that_this_server_did_not_sign(api: Api, text: str) -> None:
+    """It is forgotten, unread; the login works."""
+    assert read_signed(SIGNED, KEY) == UnsentForm("/x", [("a", "b")], [])
+    assert read_signed(text, KEY) is None
     browser = api.as_(None)
-    body = urlencode({"username": "x", "password": "y", "kept": packed}).encode()
+    body = urlencode({"username": "x", "password": "y", "kept": text}).encode()
     answer = browser.call("POST", "/login", body=body, headers={**FORM, **HTML})
-    assert answer.status in (401, 429)
-    assert unpacked(packed) is None
+    assert answer.status in (401, 413, 429)
+    assert "is kept" not in answer.body.decode()
+
+
+@pytest.mark.parametrize("length", [MOST_KEPT, 5 * MOST_KEPT])
+def test_a_large_form_is_not_kept_over_a_login_and_the_page_says_so(api: Api, length: int) -> None:
+    """Whether it was read, or is too large to be read before its sender is known."""
+    body = urlencode({"csrf_token": "old", "child": "X", "notes": "a" * length}).encode()
+    answer = api.as_(None).call(
+        "POST", "/items/X/bom/lines", body=body, headers={**FORM, **HTML, **SAME_SITE}
+    )
+    assert answer.status == 401
+    assert "What you sent is not kept" in answer.body.decode()
+    assert 'name="kept"' not in answer.body.decode()
 
 
 @pytest.mark.parametrize("name", ["password", "again", "current"])
 def test_a_form_with_a_password_is_not_kept(name: str) -> None:
     """It goes nowhere but where it was typed for, not even packed into the login form."""
-    assert kept_form("/x", FormData([("notes", "a"), (name, "correct horse")])) is None
-    kept = kept_form("/x", FormData([("notes", "a"), ("csrf_token", "secret")]))
+    assert unsent_form("/x", FormData([("notes", "a"), (name, "correct horse")])) is None
+    kept = unsent_form("/x", FormData([("notes", "a"), ("csrf_token", "secret")]))
     assert kept is not None
     assert list(kept.fields) == [("notes", "a")]
 
@@ -284,7 +315,7 @@ def test_a_new_secret_is_shown_once(visitors: dict[str, Visitor]) -> None:
 def test_a_kept_form_leads_nowhere_else() -> None:
     """Its address is one of this server."""
     for path in ("https://elsewhere", "//elsewhere", "/\\elsewhere", "javascript:alert(1)"):
-        kept = unpacked(UnsentForm(path, [("a", "b")]).packed)
+        kept = read_signed(UnsentForm(path, [("a", "b")]).signed(KEY), KEY)
         assert kept is not None
         assert kept.path == "/"
 

@@ -47,6 +47,14 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(Exception, _fault)
 
 
+async def answer_of(request: Request, error: Exception) -> Response:
+    """Answer an error that was noticed before any route had the request, as the application would."""
+    handlers = request.app.exception_handlers
+    handler = next(handlers[kind] for kind in type(error).__mro__ if kind in handlers)
+    response: Response = await handler(request, error)
+    return response
+
+
 def error_answer(
     status: int,
     code: str,
@@ -101,7 +109,8 @@ def _problem(entry: Mapping[str, Any]) -> str:
 
 async def _http_exception(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
-    codes = {404: RouteMissingError.code, 405: RouteMissingError.code, 413: "too_large"}
+    missing = RouteMissingError.code
+    codes = {404: missing, 405: missing, 413: "too_large", 503: BusyError.code}
     message = str(error.detail)
     if message == HTTPStatus(error.status_code).phrase:
         message = f"{message}: {request.method} {request.url.path}"

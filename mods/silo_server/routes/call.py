@@ -18,6 +18,7 @@ from silo_server.db.transaction import Tx
 from silo_server.db.turnstile import Turnstile
 from silo_server.events.hub import Hub
 from silo_server.http.request_log import info_of
+from silo_server.http.unknown_callers import NEEDS_TOKEN
 from silo_server.probe import Probe
 from silo_server.routes.masked_secret import unmasked
 from silo_server.routes.requests import FORM_TYPES, form_of
@@ -83,7 +84,7 @@ class Guard:
         actor = await anyio.to_thread.run_sync(find_actor, request)
         info_of(request.scope).user = actor.username if actor else None
         if actor is None:
-            raise AuthError("a valid token is needed: send it as 'Authorization: Bearer silo_…'")
+            raise AuthError(NEEDS_TOKEN)
         if not actor.role.covers(self.role):
             raise ForbiddenError(
                 f"{actor.username} is {actor.role}, this needs {self.role}; an admin can change that"
@@ -109,6 +110,12 @@ def find_actor(request: Request) -> Actor | None:
         return actor_by_token(server.db, secret.strip(), address)
     cookie = request.cookies.get(SESSION_COOKIE)
     return actor_by_session(server.db, cookie, address) if cookie else None
+
+
+def find_user(request: Request) -> int | None:
+    """Find the id of the user who sends the request; None if unknown."""
+    actor = find_actor(request)
+    return actor.user_id if actor else None
 
 
 def client_address(request: Request) -> str:

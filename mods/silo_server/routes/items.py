@@ -45,7 +45,7 @@ from silo_server.routes.models import (
     Text,
     UuidsBody,
 )
-from silo_server.routes.requests import ExpectedVersion, idempotency_key, json_body
+from silo_server.routes.requests import BoundedRoute, ExpectedVersion, idempotency_key, json_body
 from silo_server.schema import describe, describe_form, find_schema, schemas
 from silo_server.services import documents, items, revisions, scene, search
 from silo_server.services.bom.last_sync import NEVER, LastSync, last_sync, last_syncs
@@ -65,7 +65,7 @@ from silo_server.services.releases import draft_of
 from silo_server.services.revisions import RevisionOrigin, revision_to_wire
 from silo_server.values import Document, Item, Revision
 
-router = APIRouter(prefix="/api", tags=["items"], responses=READ_ERRORS)
+router = APIRouter(route_class=BoundedRoute, prefix="/api", tags=["items"], responses=READ_ERRORS)
 
 PATCH_BODY = {
     "requestBody": {
@@ -272,7 +272,9 @@ def _answer(item: Item, status: int = 200, last: LastSync | None = None) -> Resp
     return json_answer(item_to_wire(item, last), status, {"ETag": etag_of(item.version)})
 
 
-revisions_router = APIRouter(prefix="/api/items/{part_number}", tags=["revisions"], responses=READ_ERRORS)
+revisions_router = APIRouter(
+    route_class=BoundedRoute, prefix="/api/items/{part_number}", tags=["revisions"], responses=READ_ERRORS
+)
 
 # A file is handed out as a thing to keep, never as something a browser would run or show.
 DOWNLOAD_HEADERS = {
@@ -592,7 +594,7 @@ def _download(call: Call, find: Find, number: int | None = None) -> Response:
     )
 
 
-by_uuid = APIRouter(prefix="/api", tags=["documents"], responses=READ_ERRORS)
+by_uuid = APIRouter(route_class=BoundedRoute, prefix="/api", tags=["documents"], responses=READ_ERRORS)
 
 
 def document_at(uuid: str) -> Find:

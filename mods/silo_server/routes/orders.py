@@ -24,7 +24,7 @@ from silo_server.routes.bom.imports import IMPORT_BODY, uploaded
 from silo_server.routes.call import Admin, Call, Editor, Viewer
 from silo_server.routes.made_files import CSV, XLSX, content_of, file_of
 from silo_server.routes.models import Brief, RequestBody, Short, Text
-from silo_server.routes.requests import ExpectedVersion
+from silo_server.routes.requests import BoundedRoute, ExpectedVersion
 from silo_server.services import orders, suppliers
 from silo_server.services.bom.import_table import Layout, Record, as_csv, guess_of, read_csv
 from silo_server.services.items import get_item
@@ -33,7 +33,7 @@ from silo_server.services.product.export import Export
 from silo_server.services.product.export_files import to_csv, to_xlsx
 from silo_server.services.suppliers import decimal_text
 
-router = APIRouter(prefix="/api", tags=["orders"], responses=READ_ERRORS)
+router = APIRouter(route_class=BoundedRoute, prefix="/api", tags=["orders"], responses=READ_ERRORS)
 
 
 def _exact(value: object) -> object:

@@ -15,12 +15,18 @@ from silo_server.fields import to_wire
 from silo_server.routes.answers import READ_ERRORS, WRITE_ERRORS, json_answer
 from silo_server.routes.call import Call, Editor, Viewer
 from silo_server.routes.models import RequestBody, Text
+from silo_server.routes.requests import BoundedRoute
 from silo_server.services import releases
 from silo_server.services.items import get_item
 from silo_server.services.product import frozen
 from silo_server.services.releases import Release
 
-router = APIRouter(prefix="/api/items/{part_number}/releases", tags=["releases"], responses=READ_ERRORS)
+router = APIRouter(
+    route_class=BoundedRoute,
+    prefix="/api/items/{part_number}/releases",
+    tags=["releases"],
+    responses=READ_ERRORS,
+)
 
 
 class SubmitBody(RequestBody):

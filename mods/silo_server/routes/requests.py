@@ -3,20 +3,26 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Callable, Coroutine
 from typing import Annotated, Any
 
 import anyio.to_thread
-from fastapi import Depends, Query, Request
+from fastapi import Depends, HTTPException, Query, Request
+from fastapi.routing import APIRoute
 from starlette.datastructures import FormData
+from starlette.responses import Response
 
 from silo.bom.errors import RejectedError
 from silo.bom.numbers import whole_number
+from silo.bounded_json import read_json
+from silo.budget import MIB, Budget, OverBudgetError
 from silo_server.services.field_checks import text_problem
 
 FORM_TYPES = ("application/x-www-form-urlencoded", "multipart/form-data")
 # A decision about all lines of the largest BOM has a field for each.
 MOST_FIELDS = 25_000
+# The largest merge that is taken has 20 000 entries of some twenty values.
+BODY = Budget(bytes=64 * MIB, objects=250_000, cells=1_000_000, depth=1000, text=16 * MIB)
 
 
 async def form_of(request: Request) -> FormData:
@@ -30,11 +36,35 @@ async def json_body(request: Request) -> Any:
 
     def parse() -> Any:
         try:
-            return json.loads(body, parse_constant=_no_constant)
-        except (ValueError, RecursionError) as error:
+            return read_json(body, BODY, "body", _no_constant)
+        except ValueError as error:
             raise RejectedError(f"body: wanted JSON, got something else ({error})") from None
 
     return await anyio.to_thread.run_sync(parse)
+
+
+class _BoundedRequest(Request):
+    """A request whose JSON is parsed within a budget, and beside the loop that answers all others."""
+
+    async def json(self) -> Any:
+        body = await self.body()
+        try:
+            return await anyio.to_thread.run_sync(read_json, body, BODY, "body")
+        except OverBudgetError as error:
+            raise HTTPException(error.status_hint, str(error)) from None
+
+
+class BoundedRoute(APIRoute):
+    """A route of the API that reads the JSON of its requests within a budget."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """Return the handler, which gets the bounded request."""
+        handler = super().get_route_handler()
+
+        async def bounded(request: Request) -> Response:
+            return await handler(_BoundedRequest(request.scope, request.receive))
+
+        return bounded
 
 
 def _no_constant(name: str) -> Any:

@@ -16,9 +16,10 @@ from silo_server.routes import openapi
 from silo_server.routes.answers import READ_ERRORS, WRITE_ERRORS, json_answer
 from silo_server.routes.call import Call, Editor, Viewer
 from silo_server.routes.models import RequestBody
+from silo_server.routes.requests import BoundedRoute
 from silo_server.services import items, scene
 
-router = APIRouter(prefix="/api", tags=["models"], responses=READ_ERRORS)
+router = APIRouter(route_class=BoundedRoute, prefix="/api", tags=["models"], responses=READ_ERRORS)
 
 Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 Checksum = Annotated[str, Path(pattern="^[0-9a-f]{64}$")]

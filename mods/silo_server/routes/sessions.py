@@ -12,11 +12,12 @@ from silo.api.wire import ErrorBody
 from silo_server.routes.answers import READ_ERRORS, WRITE_ERRORS, json_answer
 from silo_server.routes.call import SESSION_COOKIE, ServerDep, Viewer, client_address, server_of
 from silo_server.routes.models import RequestBody, Short, Text
+from silo_server.routes.requests import BoundedRoute
 from silo_server.routes.users import NewPassword
 from silo_server.services.access import sessions
 from silo_server.services.access.sessions import NewSession, set_own_password
 
-router = APIRouter(prefix="/api", tags=["auth"])
+router = APIRouter(route_class=BoundedRoute, prefix="/api", tags=["auth"])
 
 LOGIN_ERRORS: dict[int | str, dict[str, Any]] = {
     400: {"model": ErrorBody},

@@ -15,8 +15,9 @@ from silo_server.events import log
 from silo_server.events.stream import EventResponse
 from silo_server.routes.answers import READ_ERRORS
 from silo_server.routes.call import Viewer, find_actor
+from silo_server.routes.requests import BoundedRoute
 
-router = APIRouter(tags=["system"])
+router = APIRouter(route_class=BoundedRoute, tags=["system"])
 
 EVENT_ID = re.compile(r"(?P<number>[0-9]{1,18})(?:-(?P<tag>[0-9a-f]{8}))?")
 

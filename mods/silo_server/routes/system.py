@@ -20,10 +20,11 @@ from silo_server.routes.call import (
     ServerDep,
     Viewer,
 )
+from silo_server.routes.requests import BoundedRoute
 from silo_server.services.mode import change_mode
 from silo_server.standing import standing
 
-router = APIRouter(tags=["system"])
+router = APIRouter(route_class=BoundedRoute, tags=["system"])
 MODULES = (
     "core",
     "schemas",

@@ -15,10 +15,11 @@ from silo_server.routes import openapi
 from silo_server.routes.answers import READ_ERRORS, WRITE_ERRORS
 from silo_server.routes.call import Call, Viewer
 from silo_server.routes.models import RequestBody, Short
+from silo_server.routes.requests import BoundedRoute
 from silo_server.services.access import tokens
 from silo_server.services.access.tokens import Token, check_may_change, create_own_token
 
-router = APIRouter(prefix="/api", tags=["auth"])
+router = APIRouter(route_class=BoundedRoute, prefix="/api", tags=["auth"])
 
 
 class TokenBody(RequestBody):

@@ -14,12 +14,12 @@ from silo_server.routes import openapi
 from silo_server.routes.answers import READ_ERRORS, WRITE_ERRORS
 from silo_server.routes.call import Admin, Call
 from silo_server.routes.models import RequestBody, Short, Text
-from silo_server.routes.requests import PageFrom
+from silo_server.routes.requests import BoundedRoute, PageFrom
 from silo_server.services import audit
 from silo_server.services.access import login_links, users
 from silo_server.services.access.users import User
 
-router = APIRouter(prefix="/api", tags=["auth"])
+router = APIRouter(route_class=BoundedRoute, prefix="/api", tags=["auth"])
 
 NewPassword = Annotated[Text, WithJsonSchema(openapi.PASSWORD)]
 

@@ -23,6 +23,7 @@ from silo_server.actors import Actor, Role, Scope
 from silo_server.db.state import mode_of
 from silo_server.errors import TooManyAttemptsError
 from silo_server.housekeeping import last_run
+from silo_server.http.unknown_callers import UNKNOWN_BODY
 from silo_server.routes.call import (
     SAFE_METHODS,
     SESSION_COOKIE,
@@ -43,37 +44,39 @@ from silo_server.services.access import sessions, tokens, users
 from silo_server.services.access.login_links import use_login_link
 from silo_server.services.access.passwords import MIN_PASSWORD
 from silo_server.services.access.sessions import NewSession, actor_by_session, set_own_password
+from silo_server.services.access.signing import signing_key
 from silo_server.services.access.tokens import create_own_token, list_tokens, secret_of_form
 from silo_server.services.access.users import get_user, list_users
 from silo_server.services.mode import change_mode
 from silo_server.standing import standing
 from silo_server.web.forms import (
-    MOST_KEPT,
     Form,
-    UnsentForm,
     back,
     back_with_secret,
     compared,
-    kept_form,
-    local_path,
     own_site,
     password_of,
     secret_of,
     take_away_secret,
     text,
-    unpacked,
 )
+from silo_server.web.local_path import local_path
 from silo_server.web.render import LANGUAGE_COOKIE, LANGUAGES, _, page, page_for, part_of
+from silo_server.web.unsent_form import UnsentForm, read_signed, unsent_form
 
 router = APIRouter(include_in_schema=False)
 
 
 class LoginNeededError(Exception):
-    """Nobody is logged in; the login page leads back to ``target``, or to the form that was ``kept``."""
+    """The caller is not logged in; the login page leads back to ``target``, or to the form that was ``kept``.
 
-    def __init__(self, target: str, kept: UnsentForm | None = None) -> None:
+    lost
+        True for a form that was too large to be read before the login.
+    """
+
+    def __init__(self, target: str, kept: UnsentForm | None = None, lost: bool = False) -> None:
         super().__init__(target)
-        self.target, self.kept = target, kept
+        self.target, self.kept, self.lost = target, kept, lost
 
 
 class OldFormError(Exception):
@@ -96,21 +99,30 @@ class PageGuard(Guard):
                 raise
             raise OldFormError(actor, kept) from None
         except AuthError as error:
-            kept = await _pending_form(request)
             if error.status_hint != 401:
-                request.state.kept = kept
+                request.state.kept = await _pending_form(request)
                 raise
-            raise LoginNeededError(_referring_page(request), kept if own_site(request) else None) from None
+            if not own_site(request) or not _sends_form(request):
+                raise LoginNeededError(_referring_page(request)) from None
+            # A caller who is not known has no form read that could not be kept.
+            if not _is_short(request):
+                raise LoginNeededError(_referring_page(request), lost=True) from None
+            raise LoginNeededError(_referring_page(request), await _pending_form(request)) from None
 
 
 async def _pending_form(request: Request) -> UnsentForm | None:
-    """Read the form that a request sends; None if it sends none, or one too large to carry along."""
-    length = request.headers.get("content-length", "")
-    small = length.isdigit() and int(length) <= MOST_KEPT
+    """Read the form that a request sends; None if it sends none."""
+    return unsent_form(request.url.path, await form_of(request)) if _sends_form(request) else None
+
+
+def _sends_form(request: Request) -> bool:
     is_form = request.headers.get("content-type", "").startswith(FORM_TYPES)
-    if request.method in SAFE_METHODS or not is_form or not small:
-        return None
-    return kept_form(request.url.path, await form_of(request))
+    return is_form and request.method not in SAFE_METHODS
+
+
+def _is_short(request: Request) -> bool:
+    length = request.headers.get("content-length", "")
+    return length.isdecimal() and int(length) <= UNKNOWN_BODY
 
 
 Reader = Annotated[Call, Depends(PageGuard(Role.VIEWER))]
@@ -138,18 +150,30 @@ def _referring_page(request: Request) -> str:
 
 
 def _login_page(
-    request: Request, target: str, problem: str = "", status: int = 200, kept: UnsentForm | None = None
+    request: Request,
+    target: str,
+    problem: str = "",
+    status: int = 200,
+    kept: UnsentForm | None = None,
+    lost: bool = False,
 ) -> Response:
-    values = {"target": target, "problem": problem, "kept": kept}
+    signed = kept.signed(_signing_key(request)) if kept is not None else ""
+    lost = lost or (kept is not None and not signed)
+    values = {"target": target, "problem": problem, "signed": signed, "lost": lost}
     return page_for(request, None, "login.html", status=status, **values)
+
+
+def _signing_key(request: Request) -> bytes:
+    with server_of(request).db.read() as tx:
+        return signing_key(tx)
 
 
 async def to_login(request: Request, error: Exception) -> Response:
     """Lead visitors who are not logged in to the login page."""
     assert isinstance(error, LoginNeededError)
-    if error.kept is None:
+    if error.kept is None and not error.lost:
         return RedirectResponse("/login?next=" + quote(error.target, safe="/"), 303)
-    return await anyio.to_thread.run_sync(_login_page, request, error.target, "", 401, error.kept)
+    return await anyio.to_thread.run_sync(_login_page, request, error.target, "", 401, error.kept, error.lost)
 
 
 async def send_again(request: Request, error: Exception) -> Response:
@@ -178,8 +202,8 @@ def login_form(request: Request, next: Next = START) -> Response:
 def log_in(request: Request, server: ServerDep, form: Form) -> Response:
     """Begin a session and lead to ``next``, or to the form that was being sent when the last one ended."""
     target = local_path(text(form, "next"))
-    packed = form.get("kept")
-    kept = unpacked(packed) if isinstance(packed, str) and packed else None
+    signed = form.get("kept")
+    kept = read_signed(signed, _signing_key(request)) if isinstance(signed, str) and signed else None
 
     if "already" in form:
         actor = find_actor(request)

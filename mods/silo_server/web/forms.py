@@ -3,12 +3,8 @@
 
 from __future__ import annotations
 
-import base64
-import binascii
 import json
-import re
 import secrets
-import zlib
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated
@@ -26,6 +22,7 @@ from silo_server.routes.call import server_of
 from silo_server.routes.requests import form_of
 from silo_server.services.access.passwords import MAX_PASSWORD
 from silo_server.web.render import NOTICE, NOTICE_COOKIE, _
+from silo_server.web.unsent_form import unsent_form
 
 NOTICE_SECONDS = 60
 SECRET_COOKIE = "silo_shown_once"
@@ -37,7 +34,7 @@ MOST_CHANGES = 1500
 async def _form(request: Request) -> AsyncIterator[FormData]:
     form = await form_of(request)
     # For a page that says why it was refused: a handler of errors may get a request without its body.
-    request.state.kept = kept_form(request.url.path, form)
+    request.state.kept = unsent_form(request.url.path, form)
     try:
         yield form
     finally:
@@ -81,82 +78,6 @@ def password_of(form: FormData, name: str) -> str:
 def whole(form: FormData, name: str) -> int | None:
     """Read a whole number; None if there is none."""
     return whole_number(text(form, name))
-
-
-# Forms with one of these fields are not kept: a password goes only where it was typed for.
-_PASSWORDS = frozenset({"password", "again", "current"})
-# Fields that no person typed.
-_MACHINE = re.compile(
-    r"csrf_token|at|back|target|view|mark|asked|bulk|version|packed|child_id|change_id|next|from|id|key|base_revision"
-    r"|was[_.].*"
-)
-MOST_KEPT = 4 * 1024 * 1024
-
-
-@dataclass(frozen=True, slots=True)
-class UnsentForm:
-    """A form that was not carried out, to be sent again by the person who filled it in.
-
-    files
-        (field, name) of the files in it, which have to be chosen again.
-    """
-
-    path: str
-    fields: Sequence[tuple[str, str]]
-    files: Sequence[tuple[str, str]] = ()
-
-    @property
-    def typed(self) -> list[tuple[str, str]]:
-        """List (label, text) of what a person typed or chose."""
-        typed_fields = [
-            (name, value) for name, value in self.fields if value and not _MACHINE.fullmatch(name)
-        ]
-        lines = [value for name, value in typed_fields if name == "chosen"]
-        shown = [(_label(name), value) for name, value in typed_fields if name != "chosen"]
-        return shown + ([(_("Chosen lines"), str(len(lines)))] if lines else [])
-
-    @property
-    def packed(self) -> str:
-        """Pack the form into one text, which travels in the login form; "" if it is too large."""
-        text = json.dumps([self.path, self.fields, self.files])
-        if len(text) > MOST_KEPT:
-            return ""
-        return base64.b64encode(zlib.compress(text.encode("utf-8", "surrogatepass"))).decode("ascii")
-
-
-def _label(name: str) -> str:
-    labels = {"child": _("Part number"), "why": _("Reason for the change")}
-    # "p.mass_kg", and "o.1.name" with "o.1.value", are properties in the form of an item.
-    plain = re.sub(r"^p\.|^o\.\d+\.(?=value$)", "", re.sub(r"^o\.\d+\.name$", "property", name))
-    return labels.get(name, _(plain.replace("_", " ").capitalize()))
-
-
-def kept_form(path: str, form: FormData) -> UnsentForm | None:
-    """Copy what a form holds, without its secret; None if it holds a password."""
-    if _PASSWORDS & form.keys():
-        return None
-    pairs = form.multi_items()
-    fields = [(name, value) for name, value in pairs if isinstance(value, str) and name != "csrf_token"]
-    files = [(name, file.filename) for name, file in pairs if not isinstance(file, str) and file.filename]
-    return UnsentForm(path, fields, files)
-
-
-def unpacked(packed: str) -> UnsentForm | None:
-    """Unpack a text of :attr:`UnsentForm.packed`; None if it is something else."""
-    unpacker = zlib.decompressobj()
-    try:
-        data = unpacker.decompress(base64.b64decode(packed, validate=True), MOST_KEPT * 4)
-        path, fields, files = json.loads(data.decode("utf-8", "surrogatepass"))
-        pairs = [(str(name), str(value)) for name, value in fields]
-        return UnsentForm(local_path(path), pairs, [(str(name), str(file)) for name, file in files])
-    except (binascii.Error, ValueError, TypeError, AttributeError, RecursionError, zlib.error):
-        return None
-
-
-def local_path(target: str) -> str:
-    """Return ``target`` if it is a path of this server, else the start page: nobody is sent elsewhere."""
-    plain = target.startswith("/") and not target.startswith(("//", "/\\"))
-    return target if plain and target.isprintable() else "/"
 
 
 def back_to(form: FormData, usual: str, below: str = "/items/") -> str:

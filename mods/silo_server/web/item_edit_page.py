@@ -33,8 +33,9 @@ from silo_server.services.releases import draft_of
 from silo_server.services.revisions import RevisionOrigin
 from silo_server.values import Document, Item, Revision
 from silo_server.web.accounts import Writer
-from silo_server.web.forms import Form, UnsentForm, back, compared, problems_of, same_text, text, whole
+from silo_server.web.forms import Form, back, compared, problems_of, same_text, text, whole
 from silo_server.web.render import N_, _, isolate, page, segment
+from silo_server.web.unsent_form import UnsentForm
 
 router = APIRouter(include_in_schema=False)
 

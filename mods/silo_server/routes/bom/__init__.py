@@ -6,8 +6,11 @@ from __future__ import annotations
 from fastapi import APIRouter
 
 from silo_server.routes.answers import READ_ERRORS
+from silo_server.routes.requests import BoundedRoute
 
 
 def bom_router(tag: str) -> APIRouter:
     """Make a router below the address of an item's BOM; ``tag`` is its chapter of the API's document."""
-    return APIRouter(prefix="/api/items/{part_number}/bom", tags=[tag], responses=READ_ERRORS)
+    return APIRouter(
+        route_class=BoundedRoute, prefix="/api/items/{part_number}/bom", tags=[tag], responses=READ_ERRORS
+    )

@@ -21,7 +21,7 @@ from silo_server.routes.models import (
     NewLineBody,
     NumbersBody,
 )
-from silo_server.routes.requests import ExpectedVersion
+from silo_server.routes.requests import BoundedRoute, ExpectedVersion
 from silo_server.services.bom import line_edit
 from silo_server.services.bom.conflicts import last_cad_quantities
 from silo_server.services.bom.last_sync import NEVER, last_syncs
@@ -33,7 +33,7 @@ from silo_server.values import Item, LineState
 
 router = bom_router("bom")
 
-several = APIRouter(prefix="/api", tags=["bom"], responses=READ_ERRORS)
+several = APIRouter(route_class=BoundedRoute, prefix="/api", tags=["bom"], responses=READ_ERRORS)
 
 
 @router.get("", response_model=list[LineOut])
