@@ -6,7 +6,7 @@ Each page begins in an empty folder that holds ``examples``, with an empty home 
 the ``silo-mod`` beside this Python. Exit code 1 names the first command that did not do what its page says. A
 page says in HTML comments what a reader does not need:
 
-    <!-- before: COMMANDS -->   make what the page takes for granted
+    <!-- before: COMMANDS -->   what others did before, or what the reader does in FreeCAD
     <!-- not run: REASON -->    the next block is left out; a path in the reason must exist
     <!-- browser: STEPS -->     what the reader does in the browser: open PATH, press NAME, fill LABEL: TEXT,
                                 see TEXT, download NAME
@@ -202,6 +202,9 @@ def follow(page: Path, *first: Path) -> str:
         home, work = Path(scratch, "home"), Path(scratch, "work")
         home.mkdir()
         shutil.copytree(ROOT / "examples", work / "examples", ignore=shutil.ignore_patterns("__pycache__"))
+        activate = work / ".venv" / "bin" / "activate"  # the programs are on the PATH already
+        activate.parent.mkdir(parents=True)
+        activate.touch()
         env = {name: value for name, value in os.environ.items() if not name.startswith(("SILO_", "XDG_"))}
         env |= {name: str(home) for name in ("HOME", "USERPROFILE", "LOCALAPPDATA", "APPDATA")}
         env |= {f"GIT_{who}_{what}": "x@y" for who in ("AUTHOR", "COMMITTER") for what in ("NAME", "EMAIL")}

@@ -158,6 +158,23 @@ def test_the_exit_codes_are_the_same_everywhere() -> None:
     assert codes in (ROOT / "README.md").read_text("utf-8").replace("\n", " ").replace("codes: ", "")
 
 
+def test_readme_works_as_it_is_seen() -> None:
+    """No command stands where a reader does not see it; the page is short, and FreeCAD is its first picture."""
+    text = (ROOT / "README.md").read_text("utf-8")
+    assert "before" not in {step.kind for step in page_commands.steps(text)}
+    assert text.count("\n") < 90
+    assert re.findall(r"!\[([^]]*)\]", text)[0].startswith("FreeCAD")
+    visible = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
+    lines = [words for step in page_commands.steps(visible) for words in step.commands() if step.kind == "sh"]
+    circle = ("serve", "login", "bom", "register", "commit", "status", "pull", "diff", "sync", "order")
+    found = [name for line in lines for name in re.findall(r"^silo-mod ([a-z-]+)", line)]
+    assert [name for name in found if name in circle] == list(circle)
+    assert "inertia" in found
+    for number, line in enumerate(lines):  # a terminal begins without the environment
+        if line.startswith("silo-mod serve"):
+            assert lines[number + 1] == ". .venv/bin/activate"
+
+
 LANGUAGES = {"before", "browser", "sh", "text", "python", "json", "toml", "yaml", "csv", "sql"}
 
 

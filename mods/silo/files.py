@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The files that a run names: which are meant, whether they exist, whether they may be written."""
+"""The files that a run names to read: which are meant, and whether they exist."""
 
 from __future__ import annotations
 
@@ -122,13 +122,3 @@ def _documents_of(top: str) -> list[str]:
     if glob.has_magic(top) and not os.path.lexists(top):
         return sorted(glob.glob(top)) or [top]
     return [top]
-
-
-def check_writable(*paths: str | None) -> None:
-    """Raise InputError for a file that cannot be written, before a long run."""
-    for path in filter(None, paths):
-        folder = os.path.dirname(path) or "."
-        if not os.path.isdir(folder):
-            raise InputError(f"{path} cannot be written: there is no folder {folder}")
-        if os.path.isdir(path) or not os.access(path if os.path.exists(path) else folder, os.W_OK):
-            raise InputError(f"{path} cannot be written: it is a folder, or may not be changed")

@@ -36,7 +36,7 @@ URL, TOKEN, VERIFY = "SILO_API_URL", "SILO_API_TOKEN", "SILO_SSL_VERIFY"
 _KEYS = ("url", "token", "verify")
 _HOW = (
     "Start one on this computer with `silo-mod serve` (it prints its address and a token), then run "
-    f"`silo-mod login URL`, set {URL} and {TOKEN}, or give --server and --token"
+    f"`silo-mod login http://127.0.0.1:8080`, set {URL} and {TOKEN}, or give --server and --token"
 )
 
 

@@ -40,6 +40,7 @@ from silo.bom.errors import (
     duration,
 )
 from silo.bom.numbers import whole_number
+from silo.bom.proposed_command import proposed
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -186,8 +187,9 @@ def error_of(reply: Reply, *, writing: bool = False) -> SiloError:
     detail = f": {reported.text}" if reported.text else ""
     asked, host, status = reply.where.asked, reply.where.host, reply.status
     if status == 401 and not reply.secret:
+        login = proposed("login", reply.where.host)
         return AuthError(
-            f"{host} wants a token, and none was given. `silo-mod login URL` asks for one and keeps it; "
+            f"{host} wants a token, and none was given. {login} asks for one and keeps it; "
             "SILO_API_TOKEN or the settings name one too"
         )
     if status == 401:

@@ -58,9 +58,11 @@ def _run(argv: Sequence[str] | None) -> int:
             sys.stdout.strict = True  # type: ignore[union-attr]
         _refuse_empty(args)
         from silo.cli.options import refuse_idle_options
+        from silo.cli.outputs import refuse_bad_outputs
         from silo.cli.progress import progress_of
 
         refuse_idle_options(args.parser, args)
+        refuse_bad_outputs(args.parser, args)
         with nullcontext() if hasattr(args, "waits") else progress_of(args.command):
             return _run_each(args)
     except SystemExit as end:  # argparse: --help and --version are output like any other

@@ -99,11 +99,13 @@ def build_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
             )
             if chosen in (None, name):
                 from silo.cli.options import add_shared
+                from silo.cli.outputs import declare_shared_outputs
 
                 there, word = importlib.import_module(f"silo.cli.{module}"), name.replace("-", "_")
                 if add := getattr(there, f"add_{word}", None):  # options of its own
                     add(one)
                 add_shared(one, name)
+                declare_shared_outputs(one, name)
                 one.set_defaults(run=getattr(there, f"run_{word}"), parser=one)
     parser.epilog = "\n".join([*lines, "", spoken(_EPILOG)])
     return parser

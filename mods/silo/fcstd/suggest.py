@@ -19,6 +19,7 @@ from pathlib import Path
 from silo.bom.entry import Extraction, walk_entries
 from silo.bom.errors import DocumentError
 from silo.bom.findings import Finding, FindingCode
+from silo.bom.proposed_command import proposed
 from silo.bom.walk.identity import identity_of
 from silo.fcstd.document import FcstdDocument
 from silo.fcstd.library import Library
@@ -65,10 +66,10 @@ def _with_suggestion(
         return finding
     file, why = meant[finding.file]
     holder = finding.where[0].doc_path if finding.where else extraction.assembly.doc_path
-    top = os.path.basename(holder)
+    command = proposed("relink", Path(holder), "--from", Path(finding.file), "--to", Path(file))
     message = (
         f"{finding.message.partition(_DID_YOU_MEAN)[0]}{_DID_YOU_MEAN} {file} ({why})? "
-        f"`silo-mod relink {top} --from {finding.file} --to {file}` mends the links."
+        f"{command} mends the links."
     )
     return replace(finding, message=message, did_you_mean=file)
 

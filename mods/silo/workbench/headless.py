@@ -35,8 +35,9 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from silo.bom.errors import ConfigError, DocumentError, Exit, InputError, SiloError, exit_of
-from silo.files import check_writable, documents_in
+from silo.files import documents_in
 from silo.freecads.job import job_text
+from silo.output_files import REPORTS, Output, beginning, check_outputs
 
 if TYPE_CHECKING:
     from silo.batch import TopResult
@@ -89,8 +90,9 @@ def main(env: Mapping[str, str] = os.environ) -> int:
     """Do the job that the environment describes, and return the exit code."""
     try:
         job = HeadlessJob.from_text(job_text(env))
-        check_writable(job.json, job.report)
-        if not documents_in(job.tops):
+        tops = documents_in(job.tops)
+        check_outputs(_outputs(job), tops)
+        if not tops:
             raise InputError(f"no FreeCAD files (*.FCStd) in {', '.join(job.tops)}")
         if job.lines is not None:
             with open(job.lines, "a", encoding="utf-8") as out:
@@ -98,6 +100,17 @@ def main(env: Mapping[str, str] = os.environ) -> int:
         return _sync(job)
     except (SiloError, OSError) as error:
         return _tell(error)
+
+
+def _outputs(job: HeadlessJob) -> list[Output]:
+    """List the files that the job writes."""
+    forms = {
+        "json": REPORTS["sync"][".json"],
+        "report": REPORTS["sync"][".md"],
+        "lines": beginning("a list of BOMs", r'^\{"(begun|top)"'),
+    }
+    given = ((name, getattr(job, name)) for name in forms)
+    return [Output(f'SILO_ARGS: "{name}"', path, forms[name]) for name, path in given if path]
 
 
 def _tell(error: Exception) -> int:

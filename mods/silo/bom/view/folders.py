@@ -7,6 +7,7 @@ import os.path
 from types import ModuleType
 
 from silo.bom.entry import Extraction
+from silo.bom.proposed_command import outside_commands
 from silo.bom.walk.document import relative
 
 
@@ -32,7 +33,7 @@ def base_folder(extraction: Extraction) -> str:
 
 
 def shorten(message: str, base: str) -> str:
-    """Cut the folder ``base`` from the paths in a message."""
+    """Cut the folder ``base`` from the paths in a message, but for commands that it proposes."""
     folder = base.rstrip("/\\")
     # The root of the disk cannot be left out: all separators would go.
-    return message.replace(folder + os.sep, "") if folder else message
+    return outside_commands(lambda text: text.replace(folder + os.sep, ""), message) if folder else message

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import time
 from collections.abc import Sequence
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from silo import spoken
 from silo.bom.errors import ConfigError, Exit, InputError, SiloError, exit_of
+from silo.bom.message import message
 from silo.cli.connection import client_of
 from silo.cli.json_output import print_json
 from silo.cli.options import above_zero, add_options
@@ -63,6 +65,10 @@ def run_queue(args: argparse.Namespace) -> int:
         elif args.do == "save":
             Path(args.into).mkdir(parents=True, exist_ok=True)
             target = Path(args.into) / f"{number}-{entry.file_name}"
+            if os.path.lexists(target):
+                raise InputError(
+                    message("{path} is there already, and nothing is written over it", path=str(target))
+                )
             store.save_copy(number, target)
             print(f"{target} is written", file=sys.stderr)
     left = store.entries()

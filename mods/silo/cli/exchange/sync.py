@@ -19,7 +19,7 @@ from silo.cli.connection import client_of, reach
 from silo.cli.options import EACH
 from silo.cli.progress import count_steps, set_step
 from silo.cli.reading import reading_of, refuse_assembly_of
-from silo.files import check_writable, documents_in
+from silo.files import documents_in
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
@@ -43,7 +43,6 @@ def run_sync(args: argparse.Namespace) -> int:
     tops = documents_in(args.tops)
     if not tops:
         raise InputError(f"no FreeCAD files (*.FCStd) in {', '.join(args.tops)}")
-    check_writable(*args.report)
     folders = [top for top in args.tops if Path(top).is_dir()]
     base = os.path.realpath(folders[0]) if len(folders) == len(args.tops) == 1 else ""
     options = SyncOptions(

@@ -22,8 +22,9 @@ from silo.cli.files.bom_table import table_rows, write_csv, write_xlsx
 from silo.cli.files.bom_verify import verify
 from silo.cli.json_output import print_json
 from silo.cli.options import EACH, READING, add_options, add_top, not_with, only_with
+from silo.cli.outputs import add_outputs
 from silo.cli.reading import plan_of, read_tops
-from silo.files import check_writable
+from silo.output_files import csv_table, workbook
 
 
 def add_bom(parser: argparse.ArgumentParser) -> None:
@@ -40,10 +41,14 @@ def add_bom(parser: argparse.ArgumentParser) -> None:
                 "show why the assembly itself has so many of a part (name, label or standard): each chain"
             ),
             "--verbose": "also hints, such as links that an array could replace",
-            "--csv FILE": "write the lines as CSV (- for standard output)",
-            "--xlsx FILE": "write the lines as a workbook",
         },
     )
+    headings = ("part number", "name", "quantity", "unit", "file")
+    add_outputs(
+        parser, {"--csv FILE": "write the lines as CSV (- for standard output)"}, csv_table(*headings)
+    )
+    add_outputs(parser, {"--xlsx FILE": "write the lines as a workbook"}, workbook(*headings))
+    parser.set_defaults(to_standard_output=("--csv",))
     only_with(parser, "--resolve", "--server", "--token")
     not_with(parser, "--verify", "--flat", "--resolve", "--csv", "--xlsx", "--why", *READING)
     not_with(parser, "--why", "--flat", "--resolve", "--csv", "--xlsx", "--json", *READING)
@@ -55,7 +60,6 @@ def run_bom(args: argparse.Namespace) -> int:
         return verify(args)
     if args.why:
         return _why(args)
-    check_writable(*(path for path in (args.csv, args.xlsx) if path and path != "-"))
     if os.path.isdir(args.top) or args.assembly == EACH:
         return _show_each(args)
     extraction, summary = read_tops(args)[0], None

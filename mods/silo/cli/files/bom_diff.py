@@ -15,7 +15,6 @@ from silo.bom.view.folders import shorten
 from silo.bom.view.tree_json import finding_json
 from silo.cli.json_output import json_text, print_json
 from silo.cli.options import add_options
-from silo.files import check_writable
 from silo.platform import replacing, scratch_folder
 
 if TYPE_CHECKING:
@@ -52,7 +51,6 @@ def run_bom_diff(args: argparse.Namespace) -> int:
     """
     from silo.bom.compare.two_states import compare_assemblies
 
-    check_writable(*args.report)
     old, new = _two_states(args)
     unread = {path for state in (old, new) for path, _ in state.unreadable}
     # A file that cannot be read has neither lost its assembly nor got one.

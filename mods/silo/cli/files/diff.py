@@ -6,11 +6,13 @@ from __future__ import annotations
 import argparse
 import os
 from itertools import chain
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.compare.bom_diff import BomDiff
 from silo.bom.errors import Exit
 from silo.bom.items.naming import display_name
+from silo.bom.proposed_command import proposed
 from silo.bom.view.diff_rows import diff_json
 from silo.bom.view.folders import base_folder
 from silo.bom.view.tree_json import finding_json
@@ -142,9 +144,9 @@ def _show(
             out.print(entry_text(head, base))
         else:
             name = plain(display_name(head))
-            out.print(
-                f"{name}: no part number yet, so nothing to compare with (silo-mod register)", markup=False
-            )
+            register = proposed("register", Path(head.doc_path))
+            text = f"{name}: no part number yet, so nothing to compare with; {register} gives it one"
+            out.print(text, markup=False, soft_wrap=True)
         if head.part_number or diff.added:
             out.print(diff_table(diff, names, whole=not (blocking(resolved) or resolved.unresolved)))
         out.print()

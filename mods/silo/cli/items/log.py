@@ -5,10 +5,12 @@ from __future__ import annotations
 
 import argparse
 import os
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from silo import spoken
 from silo.bom.errors import Exit, InputError, SiloError
+from silo.bom.proposed_command import proposed
 from silo.cli.connection import client_of
 from silo.cli.json_output import print_json
 from silo.cli.options import add_each, add_options, only_with
@@ -89,7 +91,8 @@ def _identity(name: str, path: str) -> str:
         library.open(path)
         identity = identity_in(library, path)
     if not identity:
-        raise InputError(f"{name} belongs to no single item in Silo; register it (silo-mod register)")
+        register = proposed("register", Path(path))
+        raise InputError(f"{name} belongs to no single item in Silo; {register} gives it one")
     return identity
 
 

@@ -15,7 +15,9 @@ from silo.bom.errors import Exit, counted
 from silo.cli.connection import client_of, named_item
 from silo.cli.json_output import print_json
 from silo.cli.options import above_zero, add_each, add_options, only_with
+from silo.cli.outputs import add_outputs
 from silo.cli.terminal import console, plain, table_of
+from silo.output_files import csv_table, workbook
 
 if TYPE_CHECKING:
     from silo.api.wire import OrderList
@@ -32,11 +34,13 @@ def add_order(parser: argparse.ArgumentParser) -> None:
             "--revision REVISION": "of a released revision, such as B (else of the draft)",
             "--spares PERCENT": "so many percent more of each part",
             "--rest": "without what was ordered already",
-            "--csv FILE": "write a table as CSV (- for standard output)",
-            "--xlsx FILE": "write a table as a workbook",
             "--supplier NAME": "only what this supplier sells",
         },
     )
+    headings = ("Part number", "Name", "Needed", "Unit", "Remarks")
+    add_outputs(parser, {"--csv FILE": "write a table as CSV (- for standard output)"}, csv_table(*headings))
+    add_outputs(parser, {"--xlsx FILE": "write a table as a workbook"}, workbook(*headings))
+    parser.set_defaults(to_standard_output=("--csv",))
     kinds = ("bought", "made", "unsaid")
     parser.add_argument("--kind", choices=kinds, default="bought", help="only these parts (bought)")
     only_with(parser, "--csv --xlsx", "--kind", "--supplier")
@@ -44,13 +48,11 @@ def add_order(parser: argparse.ArgumentParser) -> None:
 
 def run_order(args: argparse.Namespace) -> int:
     """Print what to order, or write it as a table."""
-    from silo.files import check_writable
     from silo.platform import replacing
 
     asked = {"pieces": args.quantity, "spares": args.spares, "release": args.revision, "rest": args.rest}
     given = {name: str(value) for name, value in asked.items() if value}
     table = {"kind": args.kind} | ({"supplier": args.supplier} if args.supplier else {})
-    check_writable(*(path for path in (args.csv, args.xlsx) if path and path != "-"))
     with client_of(args) as client:
         number = named_item(client, args.part_number).part_number
         for end, path in (("csv", args.csv), ("xlsx", args.xlsx)):

@@ -24,6 +24,8 @@ from silo.cli.masses.options import (
 from silo.cli.masses.push import push_report
 from silo.cli.masses.report import show_report, verdict
 from silo.cli.options import add_each, add_options, only_with
+from silo.cli.outputs import add_outputs
+from silo.output_files import beginning
 
 if TYPE_CHECKING:
     from silo.inertia.report import InertiaReport
@@ -70,10 +72,11 @@ def add_inertia(parser: argparse.ArgumentParser) -> None:
         group,
         {
             "--urdf FILE": "take names and frames of the links from this URDF, to fill it",
-            "--urdf-out FILE": "write the URDF with its <inertial> here, the rest of it untouched",
             "--in-place": "write the <inertial> into the --urdf itself",
         },
     )
+    text = "write the URDF with its <inertial> here, the rest of it untouched"
+    add_outputs(parser, {"--urdf-out FILE": text}, beginning("a URDF", "<robot[ >]"), group)
     group.add_argument(
         "--snippet",
         choices=SNIPPETS,

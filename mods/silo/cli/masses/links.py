@@ -9,8 +9,10 @@ import sys
 from silo.bom.errors import Exit, InputError
 from silo.cli.json_output import json_text
 from silo.cli.masses.geometry import read_model
-from silo.cli.masses.options import add_geometry_options, check_outputs, need_inertia_extra
+from silo.cli.masses.options import add_geometry_options, check_scenes, need_inertia_extra
 from silo.cli.options import add_each, add_options
+from silo.cli.outputs import add_outputs, add_preview
+from silo.output_files import beginning
 
 
 def add_links(parser: argparse.ArgumentParser) -> None:
@@ -22,13 +24,9 @@ def add_links(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="make N links of parts that lie together, whatever their names",
     )
-    add_options(
-        parser,
-        {
-            "--preview FILE...": "write the links as a 3D scene (.glb), one colour each; may be repeated",
-            "--out MAP": "write the map here, not to standard output",
-        },
-    )
+    add_preview(parser, "write the links as a 3D scene (.glb), one colour each; may be repeated")
+    made_here = beginning("a link map", r"^---\n# Link map for |^\{\s*\"links\"")
+    add_outputs(parser, {"--out MAP": "write the map here, not to standard output"}, made_here)
     add_geometry_options(parser)
 
 
@@ -39,7 +37,7 @@ def run_links(args: argparse.Namespace) -> int:
         raise InputError(f"--clusters: wanted a number of links above 0, got {args.clusters}")
     if args.clusters is not None and args.urdf:
         raise InputError("--clusters groups by position and --urdf by names; give one of them")
-    check_outputs(args)
+    check_scenes(args)
     from silo.inertia.links.claims import ROOT_LINK, claim
     from silo.inertia.links.starting_map import as_map, as_yaml, starting_map
     from silo.inertia.output.whole_file import write_whole

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
 from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from silo.bom.errors import ConfigError, InputError
 from silo.cli.options import add_options, job_count, only_with
+from silo.cli.outputs import add_preview
 
 if TYPE_CHECKING:
     from silo.inertia.bom.table import BomTable
@@ -80,12 +80,11 @@ def add_bom_options(parser: argparse.ArgumentParser) -> None:
 def add_result_options(parser: argparse.ArgumentParser) -> None:
     """Add the options for where results go, and when a warning is a failure."""
     group = parser.add_argument_group("results")
+    text = "write a 3D scene (.glb) with centres of mass and inertia ellipsoids; may be repeated"
+    add_preview(parser, text, group)
     add_options(
         group,
         {
-            "--preview FILE...": (
-                "write a 3D scene (.glb) with centres of mass and inertia ellipsoids; may be repeated"
-            ),
             "--strict": "exit 1 where there is any warning",
             "--allow CODE...": "with --strict: this warning is fine",
         },
@@ -146,7 +145,7 @@ def material_table(args: argparse.Namespace) -> MaterialTable:
 
 
 def check_options(args: argparse.Namespace, *, asks_server: bool) -> None:
-    """Report bad numbers, output files and a missing server before minutes of reading, not after."""
+    """Report bad numbers, scenes and a missing server before minutes of reading, not after."""
     from silo.inertia.materials.densities import checked_density
 
     if args.default_density is not None:
@@ -157,27 +156,10 @@ def check_options(args: argparse.Namespace, *, asks_server: bool) -> None:
         from silo.api.config import resolve_server
 
         resolve_server(args.server, args.token)
-    check_outputs(args)
+    check_scenes(args)
 
 
-def check_outputs(args: argparse.Namespace) -> None:
-    """Raise InputError for files that cannot be written, or must not be: an input file, or one file twice."""
-    from silo.inertia.geometry.formats import is_model_name
-
-    report: list[str] = getattr(args, "report", [])
-    single = [getattr(args, name) for name in ("urdf_out", "out") if getattr(args, name, None)]
-    written = [*report, *args.preview, *single]
-    for name in single:
-        if is_model_name(Path(name)) and os.path.lexists(name):
-            raise InputError(f"{name} is there already and is named like a model; write to another file")
+def check_scenes(args: argparse.Namespace) -> None:
+    """Raise InputError for scenes whose names do not end in .glb."""
     if bad := [name for name in args.preview if Path(name).suffix.lower() != ".glb"]:
         raise InputError(f"--preview writes .glb, --report FILE.html a page to look at; got {', '.join(bad)}")
-    read = [getattr(args, "top", args.assembly), *getattr(args, "materials", [])]
-    read += filter(None, (getattr(args, name, None) for name in ("bom", "links", "urdf")))
-    inputs = {os.path.realpath(name) for name in read}
-    for name in written:
-        if not Path(name).absolute().parent.is_dir():
-            raise InputError(f"{name}: there is no folder {Path(name).parent}")
-        if (real := os.path.realpath(name)) in inputs:
-            raise InputError(f"{name} is read by this command, or written twice; write to another file")
-        inputs.add(real)

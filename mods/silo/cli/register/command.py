@@ -20,11 +20,12 @@ from silo.bom.view.folders import base_folder
 from silo.bom.walk.document import relative
 from silo.cli.connection import client_of
 from silo.cli.options import add_options, add_top, not_with, only_with
+from silo.cli.outputs import declare_output
 from silo.cli.reading import plan_of, read_tops
 from silo.cli.register.declaring import declare, undeclare
 from silo.cli.register.orphans import orphans
 from silo.cli.register.run import RegisterProgress, RegisterRun, warn_of_rules
-from silo.files import check_writable
+from silo.output_files import NEW
 from silo.registering.closed_files import seen_on_disk, whole_folder
 from silo.registering.journal import Journal
 from silo.registering.offer import Offer, offer
@@ -56,10 +57,12 @@ def add_register(parser: argparse.ArgumentParser) -> None:
     add_options(
         how,
         {
-            "--plan FILE": "write the proposals as a table (CSV) to edit; no more",
+            "--plan FILE": "write the proposals as a table (CSV) to edit; no more (- for standard output)",
             "--apply FILE": "register what an edited table says",
         },
     )
+    declare_output(parser, "--plan", NEW)
+    parser.set_defaults(to_standard_output=("--plan",))
     parser.add_argument(
         "--duplicates",
         choices=("leave", "join", "new"),
@@ -116,10 +119,6 @@ def run_register(args: argparse.Namespace) -> int:
         return undeclare(args)
     if args.declare:
         return declare(args)
-    if args.plan and args.plan != "-":
-        check_writable(args.plan)
-        if os.path.lexists(args.plan):
-            raise InputError(f"{args.plan} is there already, and may hold edits; name another file")
     rows = read_table(Path(args.apply).read_bytes(), args.apply) if args.apply else []
     extraction, unused, unread = _read(args)
     base = os.path.realpath(args.top) if os.path.isdir(args.top) else base_folder(extraction)

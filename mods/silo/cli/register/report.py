@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from silo.bom.walk.document import relative
 from silo.cli.json_output import print_json
+from silo.cli.proposals import proposed_again
 from silo.cli.terminal import console, plain
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def article_json(article: Modelled, base: str) -> Mapping[str, Any]:
     }
 
 
-def articles_text(articles: Sequence[Modelled], base: str) -> list[str]:
+def articles_text(args: argparse.Namespace, articles: Sequence[Modelled], base: str) -> list[str]:
     """Write the section about what is modelled in the file, line by line."""
     lines = ["Modelled in this file, not counted:"]
     most = _MOST_MODELLED if sys.stdout.isatty() else len(articles)
@@ -44,7 +45,8 @@ def articles_text(articles: Sequence[Modelled], base: str) -> list[str]:
         lines.append(f"  {article.entry.quantity} × {label} ({article.entry.object_name}{copies}{source})")
     if len(articles) > most:
         lines.append(f"  and {len(articles) - most} more; --json has them all")
-    lines.append("Declare what is a part: silo-mod register TOP.FCStd --yes --declare OBJECT")
+    first = proposed_again(args, "--yes", "--declare", articles[0].entry.object_name)
+    lines.append(f"Declare what is a part, such as the first: {first}")
     return lines
 
 
@@ -105,11 +107,12 @@ def registrations(
         text = f"⚠ {plain(where)}: unregistered, left out of the BOM{reason}"
         out.print(text, style="yellow", markup=False)
     if any(proposal.entry.silo_uuid and not proposal.entry.is_standard for proposal, _ in left):
-        out.print("Are these parts of another server? silo-mod register --adopt takes them over.")
+        adopt = proposed_again(args, "--adopt")
+        out.print(f"Are these parts of another server? {adopt} takes them over.", markup=False)
     if args.yes and any(why for _, why in left):
         out.print(
             "Is it the same part? --duplicates join takes the item, --duplicates new makes another; "
             "--plan asks for each."
         )
-    for line in articles_text(articles, base) if articles else ():
+    for line in articles_text(args, articles, base) if articles else ():
         out.print(line, markup=False, highlight=False)

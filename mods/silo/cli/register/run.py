@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -15,6 +14,7 @@ from silo import spoken
 from silo.bom.errors import ConflictError, Exit, counted
 from silo.bom.items.proposal import Proposal
 from silo.cli.progress import set_step
+from silo.cli.proposals import proposed_again
 from silo.cli.register.questions import Dialog
 from silo.cli.terminal import plain
 from silo.registering.candidate import Candidate, CandidateFiles
@@ -92,7 +92,7 @@ class RegisterRun:
         count = sum(not component.decided for component in self.found.candidates)
         print(
             f"{self.args.plan}: {counted(count, 'row')}. Edit it, then: "
-            f"silo-mod register {shlex.quote(self.args.top)} --apply {shlex.quote(self.args.plan)}",
+            f"{proposed_again(self.args, '--apply', Path(self.args.plan))}",
             file=sys.stderr,
         )
         return Exit.DONE

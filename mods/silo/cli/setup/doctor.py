@@ -118,11 +118,11 @@ def _freecad() -> str | tuple[str, Installation]:
 
 def _addon(place: Installation) -> str:
     if not place.mod.exists():
-        return f"not in {place.mod}: silo-mod install-addon puts it there"
+        return f"not in {place.mod}: `silo-mod install-addon` puts it there"
     if place.missing:
         lacks = ", ".join(f"{name} ({reason})" for name, reason in place.missing.items())
         them = "it" if len(place.missing) == 1 else "them"
-        return f"{place.mod}, without {lacks}: silo-mod install-addon installs {them}"
+        return f"{place.mod}, without {lacks}: `silo-mod install-addon` installs {them}"
     return str(place.mod)
 
 

@@ -35,11 +35,6 @@ _SUFFIXES = {f".{kind}": kind for kind in Format} | {
 }
 
 
-def is_model_name(path: Path) -> bool:
-    """Return True if a file of this name is taken for geometry, whatever it holds."""
-    return path.suffix.lower() in _SUFFIXES
-
-
 _OTHERS = {
     b"<?xml": "is XML. STEP AP242 XML (.stpx) holds no geometry; export the assembly as STEP text (.step)",
     b"\x1f\x8b": "is compressed (gzip); unpack it first",
