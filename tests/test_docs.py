@@ -159,7 +159,7 @@ def test_the_exit_codes_are_the_same_everywhere() -> None:
 
 
 def test_readme_works_as_it_is_seen() -> None:
-    """No command stands where a reader does not see it; the page is short, and FreeCAD is its first picture."""
+    """No command stands where no reader sees it; the page is short, and its first picture is FreeCAD."""
     text = (ROOT / "README.md").read_text("utf-8")
     assert "before" not in {step.kind for step in page_commands.steps(text)}
     assert text.count("\n") < 90

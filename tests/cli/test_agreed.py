@@ -18,15 +18,14 @@ from silo.bom.errors import Exit
 from silo.cli.command_table import THEMES
 from silo.cli.json_schemas import NAMES, schema_of
 from silo.cli.main import main
-from silo.cli.parser import build_parser
+from silo.cli.parser import build_parser, command_parsers
 from silo.files import documents_in
 
 DOCS = Path(__file__).parents[2] / "docs"
 
 
 def parsers() -> dict[str, argparse.ArgumentParser]:
-    (commands,) = (a for a in build_parser()._actions if isinstance(a, argparse._SubParsersAction))
-    return dict(commands.choices)
+    return command_parsers(build_parser())
 
 
 # Every command that is given a file or folder that must be there, and where in its words it stands.
@@ -48,7 +47,7 @@ WITH_PATHS = {
 }
 WITHOUT_PATHS = {
     *("pull", "serve", "backup", "summaries", "watch", "login", "doctor", "install-addon", "demo", "schema"),
-    *("search", "show", "order", "whoami", "logout", "completion", "queue"),
+    *("search", "show", "order", "whoami", "logout", "completion", "queue", "help"),
 }
 
 
@@ -240,7 +239,7 @@ def test_every_command_that_prints_data_prints_json_by_a_schema() -> None:
     """The demo prints a story for people, completion a script."""
     with_json = {name for name, one in parsers().items() if "--json" in one._option_string_actions}
     assert with_json == set(NAMES)
-    assert set(parsers()) - with_json == {"demo", "completion"}
+    assert set(parsers()) - with_json == {"demo", "completion", "help"}
     for name in NAMES:  # a key more is an error, so that no key comes in without its description
         assert not jsonschema_rs.validator_for(schema_of(name)).is_valid({"surprise": 1}), name
 
@@ -280,6 +279,15 @@ def test_a_count_is_a_number_above_zero(run: Any) -> None:
             assert f"argument {words.split()[-1]}" in done.err
 
 
+def test_help_is_a_command_too(run: Any) -> None:
+    """The list of all; the options of one; and a mistyped name is answered with the right one."""
+    assert run("help").out == run("--help").out
+    assert run("help", "sync").out == run("sync", "--help").out
+    done = run("help", "snyc")
+    assert (done.code, done.out) == (Exit.BAD_INPUT, "")
+    assert "did you mean sync" in done.err
+
+
 def test_silo_mod_alone_lists_every_command_by_theme(run: Any) -> None:
     """Each once, with the words of its own help."""
     assert main([]) == Exit.DONE
@@ -316,6 +324,7 @@ LOCAL = ("mass", "inertia", "links")
 # Commands that take other paths, or no file of FreeCAD's and no server that somebody else runs.
 ELSEWHERE = {
     *("serve", "backup", "restore", "summaries", "demo", "login", "logout", "install-addon", "completion"),
+    "help",
     *("schema", "bom-diff", "relink"),
 }
 # Commands that read a file or ask a server, as docs/headless.md lists them.

@@ -14,12 +14,11 @@ from typing import Any
 import pytest
 
 from silo.bom.errors import Exit
-from silo.cli.parser import build_parser
+from silo.cli.parser import build_parser, command_parsers
 
 
 def parsers() -> dict[str, argparse.ArgumentParser]:
-    (commands,) = (a for a in build_parser()._actions if isinstance(a, argparse._SubParsersAction))
-    return dict(commands.choices)
+    return command_parsers(build_parser())
 
 
 ARM = Path(__file__).parents[2] / "examples" / "arm"

@@ -166,6 +166,7 @@ THEMES = {
             "print what completes commands and options in a shell",
             "silo-mod completion bash > ~/.local/share/bash-completion/completions/silo-mod",
         ),
+        "help": ("setup.help", "show the commands, or the options of one", "silo-mod help sync"),
         "schema": (
             "setup.schema",
             "print the JSON Schema of what a command prints with --json",

@@ -62,9 +62,9 @@ class _Parser(argparse.ArgumentParser):
     def _known_words(self) -> set[str]:
         if self._subparsers is None:
             return {str(choice) for action in self._actions for choice in action.choices or ()}
-        (commands,) = (action for action in self._actions if isinstance(action, argparse._SubParsersAction))
-        options = (parser._option_string_actions for parser in commands.choices.values())
-        return set(commands.choices).union(*options)
+        commands = command_parsers(self)
+        options = (parser._option_string_actions for parser in commands.values())
+        return set(commands).union(*options)
 
 
 def build_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
@@ -109,6 +109,12 @@ def build_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
                 one.set_defaults(run=getattr(there, f"run_{word}"), parser=one)
     parser.epilog = "\n".join([*lines, "", spoken(_EPILOG)])
     return parser
+
+
+def command_parsers(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    """Return the parser of each command."""
+    (commands,) = (action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
+    return dict(commands.choices)
 
 
 class _Version(argparse.Action):
