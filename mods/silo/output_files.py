@@ -39,7 +39,7 @@ _HEAD_ROWS = 100
 
 
 @dataclass(frozen=True)
-class Form:
+class OutputForm:
     """What an output is.
 
     name
@@ -60,30 +60,30 @@ class Output(NamedTuple):
 
     option: str
     path: str
-    form: Form
+    form: OutputForm
 
 
-def beginning(name: str, pattern: str, *, suffix: str = "") -> Form:
+def beginning(name: str, pattern: str, *, suffix: str = "") -> OutputForm:
     """Return the form of a text whose beginning has ``pattern``."""
 
     def recognises(path: Path) -> bool:
         head = _head(path)
         return b"\0" not in head and re.search(pattern, head.decode("utf-8-sig", "replace")) is not None
 
-    return Form(name, recognises, suffix)
+    return OutputForm(name, recognises, suffix)
 
 
-def scene(name: str = "a 3D scene") -> Form:
+def scene(name: str = "a 3D scene") -> OutputForm:
     """Return the form of a GLB that silo-mod made; others may be models of somebody."""
 
     def recognises(path: Path) -> bool:
         head = _head(path)
         return head.startswith(b"glTF") and b'"generator":"silo-mod"' in head[:300]
 
-    return Form(name, recognises, ".glb")
+    return OutputForm(name, recognises, ".glb")
 
 
-def csv_table(*headings: str) -> Form:
+def csv_table(*headings: str) -> OutputForm:
     """Return the form of a CSV table with these headings, perhaps beside others."""
 
     def recognises(path: Path) -> bool:
@@ -96,10 +96,10 @@ def csv_table(*headings: str) -> Form:
             return False
         return _has_headings(rows, headings)
 
-    return Form("a CSV table", recognises)
+    return OutputForm("a CSV table", recognises)
 
 
-def workbook(*headings: str) -> Form:
+def workbook(*headings: str) -> OutputForm:
     """Return the form of a workbook with these headings, perhaps beside others."""
 
     def recognises(path: Path) -> bool:
@@ -113,14 +113,14 @@ def workbook(*headings: str) -> Form:
             return False
         return any(_has_headings([row.cells for row in grid.rows()], headings) for grid in grids)
 
-    return Form("a workbook", recognises)
+    return OutputForm("a workbook", recognises)
 
 
 # silo.vault.index looks closer at a database.
-INDEX = Form("an index", lambda path: _head(path).startswith(b"SQLite format 3\0"))
+INDEX = OutputForm("an index", lambda path: _head(path).startswith(b"SQLite format 3\0"))
 
 # An output for which each existing file is somebody's work.
-NEW = Form("a new file", lambda _path: False)
+NEW = OutputForm("a new file", lambda _path: False)
 
 
 _JSON_OBJECT = r'^\s*\{{\s*"{first}"'

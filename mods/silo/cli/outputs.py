@@ -15,16 +15,16 @@ from typing import Any
 from silo.bom.errors import InputError
 from silo.bom.message import message
 from silo.cli.options import add_options
-from silo.output_files import INDEX, REPORTS, Form, Output, check_outputs, scene
+from silo.output_files import INDEX, REPORTS, OutputForm, Output, check_outputs, scene
 
 # Of a path, since the ending of a report decides how it is written.
-FormOf = Callable[[str], Form]
+FormOf = Callable[[str], OutputForm]
 
 
 def add_outputs(
     parser: argparse.ArgumentParser,
     helps: Mapping[str, str],
-    form: Form | FormOf,
+    form: OutputForm | FormOf,
     group: argparse._ActionsContainer | None = None,
 ) -> None:
     """Add options that name files to write: ``--option FILE``, or ``--option FILE...`` for several."""
@@ -33,9 +33,9 @@ def add_outputs(
         declare_output(parser, spec.partition(" ")[0], form)
 
 
-def declare_output(parser: argparse.ArgumentParser, option: str, form: Form | FormOf) -> None:
+def declare_output(parser: argparse.ArgumentParser, option: str, form: OutputForm | FormOf) -> None:
     """Declare that an option names a file to write."""
-    form_of: FormOf = (lambda _path, kept=form: kept) if isinstance(form, Form) else form  # type: ignore[misc]
+    form_of: FormOf = (lambda _path, kept=form: kept) if isinstance(form, OutputForm) else form  # type: ignore[misc]
     parser.set_defaults(outputs=(*(parser.get_default("outputs") or ()), (option, form_of)))
 
 
