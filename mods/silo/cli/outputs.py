@@ -15,7 +15,7 @@ from typing import Any
 from silo.bom.errors import InputError
 from silo.bom.message import message
 from silo.cli.options import add_options
-from silo.output_files import INDEX, REPORTS, OutputForm, Output, check_outputs, scene
+from silo.output_files import INDEX, REPORTS, Output, OutputForm, check_outputs, scene
 
 # Of a path, since the ending of a report decides how it is written.
 FormOf = Callable[[str], OutputForm]
