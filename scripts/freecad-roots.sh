@@ -24,12 +24,12 @@ SELF=$(realpath "${BASH_SOURCE[0]}")
 SUITES=(bookworm trixie sid)
 declare -A FREECAD_OF=([bookworm]=0.20 [trixie]=1.0 [sid]=1.1)
 # Raise this when the recipe below changes: finished roots are then completed anew.
-RECIPE=2
+RECIPE=3
 # The second line is what FreeCAD's window needs under Xvfb and what apt would only recommend.
 PACKAGES=(freecad freecad-python3 ca-certificates
   libgl1-mesa-dri fonts-dejavu-core procps)
 # What the add-on needs inside FreeCAD; package.xml declares the same.
-DEPENDENCIES=(requests pydantic)
+DEPENDENCIES=(requests pydantic sseclient-py)
 # Folders that belong to the machine's own system. Every other top folder (home, tmp, srv, …) is shown inside
 # the root at the same place, so a path means the same file inside and outside.
 SYSTEM_DIRS=" bin boot dev etc lib lib32 lib64 libx32 lost+found proc run sbin sys usr var "

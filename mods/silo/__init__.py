@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 # What the add-on needs inside FreeCAD: import name → package. package.xml declares the same.
 FREECAD_PACKAGES = {"requests": "requests>=2.31", "pydantic": "pydantic>=2.10"}
+# What the add-on works without: live events need it.
+OPTIONAL_PACKAGES = {"sseclient": "sseclient-py>=1.8"}
 
 
 def spoken(text: str, language: str = "") -> str:

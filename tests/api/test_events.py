@@ -15,7 +15,7 @@ from silo.api.events import SELDOM, Connection, ConnectionState, EventListener, 
 from silo.api.pause import Pause
 from silo.api.policy import Backoff
 from silo.api.sse import ServerEvent
-from silo.bom.errors import AuthError, ServerFaultError, UnreachableError
+from silo.bom.errors import AuthError, PackageError, ServerFaultError, UnreachableError
 from silo.testing import FakeSilo
 
 EVENTS = "GET /api/events"
@@ -417,3 +417,18 @@ def test_a_connection_that_broke_after_an_event_is_the_first_failure(
     with Watch(client) as watch:
         assert [watch.event().id for _ in range(2)] == ["1", "2"]
     assert watch.pauses == [1.0, 2.0, 1.0, 2.0]
+
+
+class WithoutReader:
+    """A server's client where the package that reads events is missing."""
+
+    def open_events(self, last_event_id: str | None = None) -> Any:
+        raise PackageError("live events need the Python package sseclient-py, which is not installed")
+
+
+def test_a_missing_package_is_a_state_of_its_own_and_tried_again_rarely() -> None:
+    """It may be installed meanwhile; the server is not at fault, so nothing else pauses."""
+    with Watch(WithoutReader()) as watch:
+        state = watch.state(Connection.NO_READER)
+        assert watch.listener._pauses.get() is None
+    assert (state.retry_in, "sseclient-py" in state.message) == (SELDOM, True)

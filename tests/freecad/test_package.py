@@ -59,7 +59,7 @@ def test_the_addon_manager_knows_what_to_install(read: dict[str, Any]) -> None:
     assert told["name"] == "Silo"
     assert told["workbench"]
     # 0.20 knows no optional packages, and asks for all.
-    needed, optional = (sorted(FREECAD_PACKAGES), ["keyring"])
+    needed, optional = (sorted(FREECAD_PACKAGES), ["keyring", "sseclient-py"])
     if read["version"] == "0.20":
         needed, optional = (sorted(needed + optional), [])
     assert told["python"] == read["freecad"]["depend"] == needed

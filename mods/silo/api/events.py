@@ -8,6 +8,7 @@ growing pauses and a little chance (many clients must not return in one moment),
 
 from __future__ import annotations
 
+import importlib.util
 import logging
 import math
 import random
@@ -32,6 +33,7 @@ from silo.api.wire import ServerState
 from silo.bom.errors import (
     AuthError,
     ConfigError,
+    PackageError,
     RejectedError,
     RouteMissingError,
     ServerFaultError,
@@ -47,7 +49,9 @@ SILENCE = 90.0
 
 
 def open_stream(transport: Transport, last_event_id: str | None, silence: float) -> HttpEventStream:
-    """Ask for the events after ``last_event_id``; raises as every request does."""
+    """Ask for the events after ``last_event_id``; raises as every request does, and PackageError."""
+    if importlib.util.find_spec("sseclient") is None:
+        raise PackageError("live events need the Python package sseclient-py, which is not installed")
     headers = {"Accept": "text/event-stream", "Cache-Control": "no-cache", "Accept-Encoding": "identity"}
     if last_event_id:
         headers["Last-Event-ID"] = last_event_id
@@ -135,6 +139,7 @@ class Connection(StrEnum):
     OFFLINE = "offline"  # no connection; it is tried again
     REFUSED = "refused"  # the token is not accepted; not tried again before a person acts
     UNSUPPORTED = "unsupported"  # the server has no events; tried again rarely, it may be updated
+    NO_READER = "no-reader"  # a Python package is missing; tried again rarely, it may be installed
     STOPPED = "stopped"  # by stop()
 
 
@@ -308,6 +313,9 @@ class EventListener:
                 # The mark is another server's; without it there is a gap, which a reset reports.
                 reason = str(error)
                 self._forget_mark(stop)
+            except PackageError as error:
+                self._rest(stop, wake, Connection.NO_READER, str(error), SELDOM)
+                continue
             except SiloError as error:
                 if stop.is_set():
                     return

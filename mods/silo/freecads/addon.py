@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from silo import FREECAD_PACKAGES
+from silo import FREECAD_PACKAGES, OPTIONAL_PACKAGES
 from silo.bom.errors import ConfigError, InputError
 from silo.freecads.run import ask_inside, find_freecadcmd
 from silo.platform import child_options, python_beside, remove_patiently
@@ -25,6 +25,8 @@ from silo.shipped_files import shipped
 
 # The Addon Manager's name for it, so that there is only one folder; and the earlier name.
 FOLDER, OLD_FOLDER = "silo-mod", "Silo"
+
+ALL_PACKAGES = FREECAD_PACKAGES | OPTIONAL_PACKAGES
 
 _ASK = """
 import importlib, json, os, sys
@@ -88,7 +90,7 @@ def ask_freecad(freecadcmd: str | None = None, data: Path | None = None) -> Inst
         replaces the data folder that FreeCAD names.
     """
     command = find_freecadcmd(freecadcmd)
-    env = {"SILO_ASK_DATA": str(data or ""), "SILO_ASK_NAMES": " ".join(FREECAD_PACKAGES)}
+    env = {"SILO_ASK_DATA": str(data or ""), "SILO_ASK_NAMES": " ".join(ALL_PACKAGES)}
     answer = ask_inside(command, _ASK, env)
     (major, minor), python = answer["freecad"], answer["python"]
     return Installation(
@@ -200,7 +202,7 @@ def install_packages(place: Installation) -> str:
         raise ConfigError(f"this FreeCAD has Python {version}; the add-on needs 3.11 or newer")
     if not place.missing:
         return str(place.packages)
-    names = [FREECAD_PACKAGES[name] for name in place.missing]
+    names = [ALL_PACKAGES[name] for name in place.missing]
     install = ["install", "--quiet", "--target", str(place.packages), *names]
     # Packages there that cannot be imported, such as those for another Python, are useless.
     if any((place.packages / name).exists() for name in place.missing):

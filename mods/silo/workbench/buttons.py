@@ -155,10 +155,10 @@ class Buttons:
 
 
 def _install() -> None:
-    from silo import FREECAD_PACKAGES
+    from silo import FREECAD_PACKAGES, OPTIONAL_PACKAGES
     from silo.workbench.settings.install import show_install
 
-    show_install(tuple(FREECAD_PACKAGES))
+    show_install((*FREECAD_PACKAGES, *OPTIONAL_PACKAGES))
 
 
 def _told(count: int) -> None:

@@ -28,6 +28,7 @@ SERVER = ServerChoice("https://silo.example.com")
         ),
         ("refused", "silo.example.com does not accept the token.", True, [Do.SETTINGS, Do.RETRY]),
         ("unsupported", "silo.example.com sends no live events", False, []),
+        ("no-reader", "Live events need the package sseclient-py.", False, [Do.INSTALL, Do.RETRY]),
         ("stopped", "silo.example.com (live events are off)", False, []),
     ],
 )

@@ -9,7 +9,7 @@ import sys
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from silo.bom.errors import AuthError, Exit, NotFoundError, RouteMissingError
+from silo.bom.errors import AuthError, Exit, NotFoundError, PackageError, RouteMissingError
 from silo.bom_sync.activity_text import activity_text
 from silo.cli.connection import client_of, named_item
 from silo.cli.json_output import json_text
@@ -64,6 +64,8 @@ def _print_events(
         if isinstance(event, ConnectionState):
             if event.kind is Connection.UNSUPPORTED:
                 raise RouteMissingError(f"there is no live connection: {event.message}")
+            if event.kind is Connection.NO_READER:
+                raise PackageError(f"{event.message}; install it with: pip install sseclient-py")
             if event.kind is Connection.REFUSED:
                 raise AuthError(f"the live connection ended: {event.message}")
             print(f"[{event}]", file=sys.stderr)

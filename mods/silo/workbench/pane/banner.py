@@ -91,4 +91,10 @@ def _connection(shown: PaneState) -> Banner:
     if kind == "unsupported":
         text = translate("Silo", "{host} sends no live events; what you commit is shown anyway.", host=host)
         return Banner(text, Tone.QUIET)
+    if kind == "no-reader":
+        text = translate(
+            "Silo", "Live events need the package sseclient-py. What you commit is shown without it, too."
+        )
+        install = Action(Do.INSTALL, translate("Silo", "Install What Silo Needs…"))
+        return Banner(text, Tone.QUIET, actions=(install, again))
     return Banner(translate("Silo", "{host} (live events are off)", host=host), Tone.QUIET)

@@ -835,6 +835,11 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../pane/banner.py" />
+            <source>Live events need the package sseclient-py. What you commit is shown without it, too.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/banner.py" />
             <source>{host} (live events are off)</source>
             <translation type="unfinished" />
         </message>

@@ -836,6 +836,11 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../pane/banner.py" />
+            <source>Live events need the package sseclient-py. What you commit is shown without it, too.</source>
+            <translation>Live-Meldungen brauchen das Paket sseclient-py. Was Sie einchecken, wird auch ohne es angezeigt.</translation>
+        </message>
+        <message>
+            <location filename="../../pane/banner.py" />
             <source>{host} (live events are off)</source>
             <translation>{host} (Live-Meldungen sind aus)</translation>
         </message>
