@@ -14,6 +14,8 @@ class GeometryCode(StrEnum):
     INVALID_SHAPE = "invalid_shape"  # the kernel's own check fails
     MESH_MISMATCH = "mesh_mismatch"  # |V_mesh - V_brep| above 2 %
     NOT_CONVERGENT = "not_convergent"  # the integration did not reach its tolerance
+    FACE_REBUILT = "face_rebuilt"  # the kernel misread a face; another reading was right
+    FACE_DIFFERS = "face_differs"  # a face does not lie between its edges as the file has them
     STATED_VOLUME = "stated_volume"  # the file states another volume (above 1e-3)
     STATED_CENTROID = "stated_centroid"
     OPEN_SHELL = "open_shell"  # a solid whose faces do not close: its volume is no fact
@@ -39,6 +41,7 @@ class GeometryCode(StrEnum):
 
 DOUBTFUL = (
     GeometryCode.BODY_MISSING,
+    GeometryCode.FACE_DIFFERS,
     GeometryCode.INVALID_SHAPE,
     GeometryCode.MESH_MISMATCH,
     GeometryCode.OPEN_SHELL,

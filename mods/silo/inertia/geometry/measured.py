@@ -288,3 +288,21 @@ def assembled(
         unit=unit,
         frames=unfolded.frames,
     )
+
+
+def face_rebuilt_note(faces: int, before_m3: float, after_m3: float) -> Note:
+    """Note spherical faces that the kernel misread, and that another reading of the file gave right."""
+    words = (
+        f"the geometry kernel misread {counted(faces, 'spherical face')} ({before_m3 * 1e6:.4g} cm³); read "
+        f"with another axis, as the edges in the file say, the volume is {after_m3 * 1e6:.4g} cm³"
+    )
+    return Note(GeometryCode.FACE_REBUILT, words)
+
+
+def face_differs_note(faces: int, doubt_m3: float, volume_m3: float) -> Note:
+    """Note spherical faces that do not lie between their edges."""
+    words = (
+        f"{counted(faces, 'spherical face does', 'spherical faces do')} not lie between the edges that the "
+        f"file has: some {doubt_m3 * 1e6:.3g} of {volume_m3 * 1e6:.4g} cm³ are in doubt"
+    )
+    return Note(GeometryCode.FACE_DIFFERS, words)

@@ -127,9 +127,7 @@ def scan(data: Buffer, wanted: frozenset[str]) -> Part21:
 
     Of the complex entities it finds units, bodies, and relationships that place a part.
     """
-    if (end := data.rfind(b"*/") + 2) > 1:  # a comment may hold what looks like an entity
-        # Most have one in the header only: the rest is not looked through.
-        data = _COMMENT.sub(_blank, data[:end]) + data[end:]
+    data = _without_comments(data)
     source = Part21(data)
     names: dict[bytes, str | None] = {}
     ordinal = 0
@@ -152,6 +150,20 @@ def scan(data: Buffer, wanted: frozenset[str]) -> Part21:
     source.count = ordinal
     source.complete = data.rfind(_END) > 0
     return source
+
+
+def entities(data: Buffer) -> Iterator[re.Match[bytes]]:
+    """Yield number and keyword of each entity of the file, in file order."""
+    return _ENTITY.finditer(_without_comments(data))
+
+
+def _without_comments(data: Buffer) -> Buffer:
+    """Blank the comments, which may hold what looks like an entity; nothing else moves."""
+    end = data.rfind(b"*/") + 2
+    if end < 2:
+        return data
+    # Most have one in the header only: the rest is not looked through.
+    return _COMMENT.sub(_blank, data[:end]) + data[end:]
 
 
 def _blank(match: re.Match[bytes]) -> bytes:

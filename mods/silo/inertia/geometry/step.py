@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -57,15 +57,21 @@ from silo.inertia.assembly import Prototype
 from silo.inertia.geometry import kernel as occt
 from silo.inertia.geometry.graph import Child, Node, bottom_up, in_metres, unfold
 from silo.inertia.geometry.helpers import WORTH_HELP, Helpers
-from silo.inertia.geometry.kernel import MM, trsf_matrix, xyz
+from silo.inertia.geometry.kernel import MM, file_faces, trsf_matrix, xyz
 from silo.inertia.geometry.kernel.solids import measure, measure_all
-from silo.inertia.geometry.measured import Measured, assembled, implausible_size
+from silo.inertia.geometry.measured import (
+    Measured,
+    assembled,
+    face_differs_note,
+    face_rebuilt_note,
+    implausible_size,
+)
 from silo.inertia.geometry.names import clean, is_generic
 from silo.inertia.geometry.options import ReadOptions, Report
 from silo.inertia.geometry.part21 import ProductFacts, Products
 from silo.inertia.geometry.part_files import bare_stem, file_key, step_files
 from silo.inertia.geometry.reading import GeometryReading
-from silo.inertia.geometry.step_text import MARK, Prepared, prepare
+from silo.inertia.geometry.step_text import MARK, Prepared, SphereTurn, prepare, with_turned_spheres
 from silo.inertia.geometry.together import Floats, combined
 from silo.inertia.notes import GeometryCode, Note
 from silo.platform import scratch_folder
@@ -288,10 +294,70 @@ def load(
     """
     with scratch_folder("silo-step-") as folder:
         text = text or prepare(path, Path(folder), max_instances)
-        document, reader = _transferred(text.source, path)
-    step = _StepWalk(path, prefix, document, reader, text.products).run()
+        step, doubts = _walked(path, prefix, text)
+        return _with_faces_read_again(step, doubts, prefix, text, Path(folder)) if doubts else step
+
+
+def _walked(path: Path, prefix: str, text: Prepared) -> tuple[StepFile, dict[str, file_faces.Doubt]]:
+    document, reader = _transferred(text.source, path)
+    walk = _StepWalk(path, prefix, document, reader, text.products)
+    step = walk.run()
     step.kept = (document, reader)
-    return step
+    return step, walk.misread()
+
+
+def _places(step: StepFile, wanted: list[Any]) -> list[int]:
+    """Find where entities of the kernel's stand among all of the file, counted from 1."""
+    model = step.kept[1].Reader().StepModel()
+    places = {id(entity): 0 for entity in wanted}
+    for place in range(1, model.NbEntities() + 1):
+        entity = model.Entity(place)
+        if id(entity) in places:
+            places[id(entity)] = place
+    return [places[id(entity)] for entity in wanted]
+
+
+READINGS = 3
+"""Of a file with misread faces, at most: each with another axis of their spheres."""
+
+
+def _with_faces_read_again(
+    step: StepFile, doubts: dict[str, file_faces.Doubt], prefix: str, text: Prepared, folder: Path
+) -> StepFile:
+    """Read a file again with other axes for its misread spheres, and note what became of them."""
+    data = text.source.read_bytes()
+    best, left = step, doubts
+    turns: dict[int, SphereTurn] = {}
+    for attempt in range(READINGS):
+        spheres = [sphere for doubt in left.values() for sphere in doubt.spheres]
+        places = _places(best, [e for sphere in spheres for e in (sphere.entity, sphere.centre_entity)])
+        for sphere, face, centre in zip(spheres, places[::2], places[1::2], strict=True):
+            if attempt < len(axes := sphere.axes()):
+                axis, across = (direction.tolist() for direction in axes[attempt])
+                turns[face] = SphereTurn(centre, sphere.in_file, axis, across)
+        changed, added = with_turned_spheres(data, turns)
+        source = folder / "turned.step"
+        source.write_bytes(changed)
+        products = replace(text.products, count=text.products.count + added)
+        again, remaining = _walked(step.path, prefix, replace(text, source=source, products=products))
+        if sum(d.doubt for d in remaining.values()) < sum(d.doubt for d in left.values()):
+            best, left = again, remaining
+        if not left:
+            break
+    for key, doubt in doubts.items():
+        notes = []
+        if best is not step:
+            before, after = (_volume_m3(read.shapes.get(key, ())) for read in (step, best))
+            notes.append(face_rebuilt_note(len(doubt.spheres), before, after))
+        if (rest := left.get(key)) is not None:
+            notes.append(face_differs_note(len(rest.spheres), rest.doubt * MM**3, rest.volume * MM**3))
+        best.problems[key] = (*best.problems.get(key, ()), *notes)
+    return best
+
+
+def _volume_m3(shapes: Iterable[Any]) -> float:
+    solids = (solid for shape in shapes for solid in occt.solids_of(shape))
+    return sum(abs(file_faces.volume_of(solid)) for solid in solids) * MM**3
 
 
 def _transferred(source: Path, named: Path) -> tuple[Any, Any]:
@@ -349,6 +415,11 @@ class _StepWalk:
             and not any(occt.has_edges(shape) or occt.faces_of(shape) for shape in shapes)
         ]
         return self._file
+
+    def misread(self) -> dict[str, file_faces.Doubt]:
+        """Find the products with faces that differ from their edges as the file has them."""
+        found = {key: file_faces.misread(shapes, self._transfer) for key, shapes in self._file.shapes.items()}
+        return {key: doubt for key, doubt in found.items() if doubt is not None}
 
     def _complete(self) -> None:
         """Add the bodies that the kernel's reader dropped, or say that they are missing."""

@@ -15,7 +15,7 @@ import mmap
 import os
 import re
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
@@ -30,6 +30,7 @@ from silo.inertia.geometry.part21 import (
     Part21,
     Products,
     count_placed,
+    entities,
     read_products,
     ref,
     refs,
@@ -280,3 +281,57 @@ def _edited(data: Buffer, edits: list[tuple[int, int, bytes]]) -> bytes:
         pieces += [data[position:start], text]
         position = end
     return b"".join([*pieces, data[position:]])
+
+
+def with_turned_spheres(data: bytes, turns: Mapping[int, SphereTurn]) -> tuple[bytes, int]:
+    """Give each face in ``turns`` a sphere of its own, with another axis. Returns the text, and how many
+    entities are new.
+
+    Faces and centres are given by their place among all entities of the file, counted from 1.
+    """
+    wanted = {*turns, *(turn.centre for turn in turns.values())}
+    found: dict[int, tuple[int, re.Match[bytes]]] = {}
+    highest = 0
+    for place, match in enumerate(entities(data), start=1):
+        number = int(match[1])
+        highest = max(highest, number)
+        if place in wanted:
+            found[place] = (number, match)
+    changes: list[tuple[int, int, bytes]] = []
+    added: list[str] = []
+    for place, turn in turns.items():
+        if place not in found or turn.centre not in found:
+            continue
+        surface = _SURFACE.match(data, found[place][1].end())
+        if surface is None:
+            continue
+        for axis in (turn.axis, turn.across):
+            highest += 1
+            added.append(f"#{highest}=DIRECTION('',({axis[0]!r},{axis[1]!r},{axis[2]!r}));")
+        centre = found[turn.centre][0]
+        added.append(f"#{highest + 1}=AXIS2_PLACEMENT_3D('',#{centre},#{highest - 1},#{highest});")
+        added.append(f"#{highest + 2}=SPHERICAL_SURFACE('',#{highest + 1},{turn.radius!r});")
+        highest += 2
+        changes.append((*surface.span(1), b"%d" % highest))
+    end = max(match.start() for match in _DATA_END.finditer(data))
+    changes.append((end, end, "\n".join(added).encode("ascii") + b"\n"))
+    pieces, position = [], 0
+    for start, stop, new in sorted(changes):
+        pieces += [data[position:start], new]
+        position = stop
+    return b"".join((*pieces, data[position:])), len(added)
+
+
+@dataclass(frozen=True, slots=True)
+class SphereTurn:
+    """Another axis of a face's sphere: the place of its centre, its radius in the file's unit, the axis and
+    the direction of its seam."""
+
+    centre: int
+    radius: float
+    axis: tuple[float, float, float]
+    across: tuple[float, float, float]
+
+
+_SURFACE = re.compile(rb"\s*'(?:[^']|'')*'\s*,\s*\([^()]*\)\s*,\s*#(\d+)\s*,\s*\.[TF]\.\s*\)")
+"""The arguments of a face: its name, its bounds, its surface and on which side of that it is."""
