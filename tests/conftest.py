@@ -10,6 +10,7 @@ import os
 import shutil
 import signal
 import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import cache
@@ -40,6 +41,9 @@ settings.load_profile("unhurried")
 for name in ("SILO_API_URL", "SILO_API_TOKEN", "COLUMNS", "LINES", "NO_COLOR", "FORCE_COLOR"):
     os.environ.pop(name, None)
 os.environ["SILO_LANGUAGE"] = "en"  # that of the machine is no matter
+# Nothing of the user's own data is read or written.
+_DATA = tempfile.TemporaryDirectory(prefix="silo-data-")
+os.environ["XDG_DATA_HOME"] = _DATA.name
 for name in ("no_proxy", "NO_PROXY"):
     os.environ[name] = ",".join(filter(None, (os.environ.get(name), "127.0.0.1,localhost,::1")))
 

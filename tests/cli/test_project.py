@@ -18,7 +18,7 @@ from silo.bom.walk.links import extract
 from silo.bom.walk.roots import choose_assembly
 from silo.fcstd import Library
 from silo.outbox.store import Store
-from silo.project_folder import PROJECT_FILE, Project, ProjectEntry
+from silo.project_folder import PROJECT_FILE, FileRecord, Project
 
 
 @pytest.fixture
@@ -245,7 +245,10 @@ def test_without_a_server_the_commit_waits_in_the_queue(
     ran = run("commit", registered, "--comment", "on the train", "--json")
     assert ran.code == 3
     assert {one["path"] for one in ran.json()["waiting"]} == set(states(ran))
-    assert run("commit", registered, "--json").json()["waiting"] == []  # nothing is kept twice
+    kept = len(Store().entries())
+    again = run("commit", registered, "--json")
+    assert (again.code, again.json()["waiting"]) == (3, ran.json()["waiting"])
+    assert len(Store().entries()) == kept  # nothing is kept twice
     monkeypatch.setenv("SILO_API_URL", address)
     assert run("commit", registered).code == 0
     assert set(states(run("status", registered, "--json")).values()) == {"same"}
@@ -259,6 +262,6 @@ def test_what_somebody_wrote_into_the_memory_of_a_project_is_left_out(tmp_path: 
     """Only what names a document is a file; keys of a newer version are passed over."""
     odd = {"a": 5, "b": {}, "c": {"document": ""}, "d": {"document": "D", "newer": 1}, "e": ["x"]}
     (tmp_path / PROJECT_FILE).write_text(json.dumps({"files": odd}))
-    assert Project(str(tmp_path)).files() == {"d": ProjectEntry("D")}
+    assert Project(str(tmp_path)).records() == {"d": FileRecord("D")}
     (tmp_path / PROJECT_FILE).write_text(json.dumps({"files": ["a"]}))
-    assert Project(str(tmp_path)).files() == {}
+    assert Project(str(tmp_path)).records() == {}

@@ -16,6 +16,7 @@ from silo.api.revisions import other_name
 from silo.api.wire import Revision
 from silo.bom.errors import RejectedError, RouteMissingError, UnreachableError
 from silo.outbox.entry import UNKNOWN, Commit, Entry, State
+from silo.project_folder import write_record
 from silo.testing import FakeSilo
 
 if TYPE_CHECKING:
@@ -170,11 +171,24 @@ def test_what_follows_a_held_one_is_held_too_and_goes_after_it(vault: Vault) -> 
 
 
 def test_a_file_of_unknown_origin_is_asked_about(vault: Vault) -> None:
-    """Such as a copied folder whose file was saved without the add-on."""
+    """Such as a copied file that was saved without the add-on, and has no record."""
     sent(vault, b"one", bom=True)
+    write_record(str(vault.top), None)
     mine(vault, b"from somewhere")
     vault.send()
     assert "made from a file that is no revision in Silo" in held(vault).reason
+
+
+def test_what_another_program_saved_is_made_from_what_was_there(vault: Vault) -> None:
+    """Its record says which revision the file was; so a colleague's newer one is found all the same."""
+    sent(vault, b"one", bom=True)
+    mine(vault, b"by another program")
+    vault.send()
+    assert (vault.waiting(), vault.files()) == ((), [b"one", b"by another program"])
+    theirs(vault, b"theirs", 2)
+    mine(vault, b"and again")
+    vault.send()
+    assert held(vault).newer["created_by"] == "alice"
 
 
 def test_the_bom_of_a_file_that_a_colleague_went_on_from_is_not_sent(vault: Vault) -> None:

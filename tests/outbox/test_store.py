@@ -34,6 +34,7 @@ from silo.outbox.send import send_all
 from silo.outbox.store import OutboxError, Store
 from silo.outbox.tables import VERSION
 from silo.platform import replacing, stamp_of
+from silo.project_folder import FileRecord, write_record
 from silo.testing import FakeSilo
 from vault import died
 
@@ -761,17 +762,24 @@ def test_a_disk_error_of_one_entry_stops_no_other(tmp_path: Path, document: Path
     assert store.pause(silo.base_url) is None
 
 
-def test_a_file_that_was_saved_and_then_committed_is_its_own_origin(store: Store, document: Path) -> None:
-    """Also while it waits; what was saved and not committed is made from what came before it."""
-    saved = hashlib.sha256(b"first").hexdigest()
+def test_what_a_file_was_made_from(store: Store, document: Path) -> None:
+    """What FreeCAD saved it from, the nearest first; then what waits, its record, and the file itself."""
     store.derived("same", "same")
-    assert [store.origin_of(content) for content in ("unknown", "same")] == ["unknown", "same"]
-    store.derived(saved, "before")
-    assert store.origin_of(saved) == "before"
-    entry = store.add(commit(document))
-    assert (entry.sha256, store.origin_of(saved)) == (saved, saved)
+    assert store.origins("same", str(document), "ID") == ("same",)
+    for content, before in (("b", "a"), ("c", "b"), ("d", "c"), ("a", "d")):  # saved in a ring, by an undo
+        store.derived(content, before)
+    assert store.lineage("d") == ["c", "b", "a"]
+    store.learn("http://silo", "b", "ID", 2)
+    assert store.origins("d", str(document), "ID") == ("b", "a", "d")
+    entry = store.add(replace(commit(document), identity="ID"))
+    assert store.origins("other", str(document), "ID") == (entry.sha256, "other")
+    assert store.origins("other", str(document), "another") == ("other",)
+    write_record(str(document), FileRecord("ID", "pulled", since=entry.taken_at + 1))
+    assert store.origins("other", str(document), "ID") == ("pulled", "other")
+    assert store.origins("pulled", str(document), "ID") == ("pulled",)
+    write_record(str(document), None)
     store.discard(entry.id)
-    assert store.origin_of(saved) == "before"
+    assert store.origins("other", str(document), "ID") == ("other",)
 
 
 def numbered_by_name(path: Path | str | int) -> tuple[int, int, int] | None:

@@ -275,7 +275,7 @@ Pulled = _shape("Pulled", top=str, complete=bool, files=_many(PulledFile), missi
 Standing = _shape(
     "Standing",
     path=str,
-    state=Literal["same", "new", "edited", "newer", "both", "waiting", "no item"],
+    state=Literal["same", "new", "edited", "newer", "both", "waiting", "held", "server set back", "unknown"],
     document=str | None,
     items=int,
     moved_from=str | None,

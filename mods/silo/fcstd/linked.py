@@ -73,14 +73,15 @@ def place_of(content: Path | str, path: str) -> ProjectPlace:
     locator = Locator()
     places: list[Linked] = []
     project = Project.of(path)
-    files = project.files() if project is not None else {}
+    records = project.records() if project is not None else {}
 
     def place(of: str) -> str:
         return (project.place(of) if project is not None else None) or ""
 
-    def kept(of: str) -> str:
-        file = files.get(place(of))
-        return file.document if file is not None else ""
+    def own_document(of: str, item: str) -> str:
+        """Return the document of a linked file that is not the item's, such as that of a copy."""
+        record = records.get(place(of))
+        return record.document if record is not None and not record.item and not record.is_of(item) else ""
 
     reached = [os.path.abspath(path)]
     with Library() as library:
@@ -91,7 +92,8 @@ def place_of(content: Path | str, path: str) -> ProjectPlace:
                 continue
             reached.append(os.path.normpath(os.path.join(folder, recorded)))
             item = identity_in(library, target.real)
-            places.append(Linked(recorded, item, _hash(target.real), "" if item else kept(target.real)))
+            document = own_document(target.real, item)
+            places.append(Linked(recorded, item, _hash(target.real), document))
     return ProjectPlace(place(path) or _below(reached), tuple(places))
 
 

@@ -48,7 +48,7 @@ def new_key() -> str:
 ASKED, SAME_PART = "asked", "same part"
 
 UNKNOWN = "unknown"
-"""The origin of a file whose origin is not known."""
+"""The origin of a file before anybody has looked."""
 
 
 @dataclass(frozen=True)
@@ -69,8 +69,9 @@ class CommitFields:
     remark
         why there is no BOM though there might be one; shown when the file has arrived.
     origin
-        SHA-256 of the committed file that this one was made from, :data:`UNKNOWN`, or "": a newer revision
-        of a colleague is not looked for (a file that has only just got its item).
+        the contents that the file was made from, by their SHA-256, the nearest first, with blanks between
+        them (:meth:`silo.outbox.store.Store.origins`); :data:`UNKNOWN`, or "": a newer revision of
+        a colleague is not looked for (a file that has only just got its item).
     on_top_of
         the newest revision that the user saw and sends this one on top of (:func:`on_top`).
     document

@@ -23,7 +23,7 @@ from silo.api.arrived import MayHaveArrivedError, SentFile, find_arrived, is_the
 from silo.api.client import SiloClient
 from silo.api.files import DocumentId, Origin
 from silo.api.policy import QUEUE_PAUSES, Backoff, ErrorScope, Then, is_certain, judge, pause_after
-from silo.api.revisions import Standing, checksum_of, is_newest, newest_number, other_name, standing
+from silo.api.revisions import Standing, checksum_of, is_newest, newest_number, other_name
 from silo.api.transport import Cancel, stop_if
 from silo.api.wire import (
     HeldItem,
@@ -51,9 +51,12 @@ from silo.bom_sync.memory import server_of
 from silo.bom_sync.reported_lines import remember_reported
 from silo.bom_sync.resolved import Resolved, resolve
 from silo.bom_sync.steps import Status, decide, merge_request, server_lines
+from silo.file_state import is_seen, is_set_back, stands
 from silo.outbox.entry import ASKED, SAME_PART, Entry, InFile, State, new_key
+from silo.outbox.recorded import note_arrived
 from silo.outbox.report import Report, Sent
 from silo.outbox.store import OutboxError, Store
+from silo.project_folder import record_of
 
 
 def went_alone(entry: Entry) -> list[str]:
@@ -374,6 +377,7 @@ class _SendRun:
     def _arrived(self, entry: Entry, revision: Revision, base: int | None = None) -> Entry:
         number = revision.revision_number
         self.store.learn(entry.server, entry.sha256, entry.identity, number)
+        note_arrived(entry, revision)
         self.store.arrived(entry, "file", number, base=base)
         return replace(entry, revision=number)
 
@@ -384,35 +388,50 @@ class _SendRun:
         """
         if not entry.origin:
             return None
-        stands = self._standing(entry, revisions, entry.origin)
-        self._check_set_back(entry, stands)
-        stands.check(entry.part_number)
-        return max(stands.base_number, 0)
+        made_from = self._standing(entry, revisions, entry.origin.split())
+        self._check_set_back(entry, revisions, made_from.newest)
+        made_from.check(entry.part_number)
+        return max(made_from.base_number, 0)
 
-    def _check_set_back(self, entry: Entry, stands: Standing) -> None:
-        """Raise NewerRevisionError if the server has lost the revision from which the file was made, and its
-        newest revision is an older one that is known here. Nothing of a colleague would be undone.
+    def _check_set_back(self, entry: Entry, revisions: Sequence[Revision], newest: Revision | None) -> None:
+        """Raise NewerRevisionError if the server has lost the revision from which the file was made, and has
+        nothing later. Nothing of a colleague would be undone.
         """
-        newest, made_from = stands.newer, entry.origin
-        if newest is None or not checksum_of(newest):
+        if newest is None or not checksum_of(newest) or is_seen(newest, entry.on_top_of):
             return
-        base, older = (
-            self.store.known_revision(entry.server, content, entry.identity)
-            for content in (made_from, checksum_of(newest))
-        )
+        record = record_of(entry.path) if entry.path else None
         before = any(
             pending.newer.get("set_back") and pending.item == entry.item for pending in self.store.entries()
         )
-        if older == newest.revision_number and (before or (base is not None and base > older)):
+        is_ours = self._known(entry, checksum_of(newest)) == newest.revision_number
+        nearest = self._nearest(entry)
+        there = {checksum_of(revision) for revision in revisions}
+        is_lost = nearest[1] > newest.revision_number if nearest[0] else before
+        was_sent = record is not None and record.sha256 == entry.sha256
+        if (is_ours and is_lost and nearest[0] not in there) or (
+            is_set_back(newest, record, entry.server) and not was_sent
+        ):
             raise NewerRevisionError(
-                f"The server was restored from a backup: it has revision {older} of {entry.part_number}, and "
-                "this is newer and came after what it has lost. Retry all sends it again",
+                f"The server was restored from a backup: it has revision {newest.revision_number} of "
+                f"{entry.part_number}, and this is newer and came after what it has lost. "
+                "Retry all sends it again",
                 {**newest.model_dump(mode="json", exclude={"properties", "links"}), "set_back": True},
             )
 
-    def _standing(self, entry: Entry, revisions: Sequence[Revision], content: str) -> Standing:
-        number = self.store.known_revision(entry.server, content, entry.identity)
-        return standing(revisions, content, number, entry.on_top_of)
+    def _nearest(self, entry: Entry) -> tuple[str, int]:
+        """Return the nearest origin that is known here as a revision, and its number; ("", 0) if none is."""
+        for content in entry.origin.split():
+            if (number := self._known(entry, content)) is not None:
+                return content, number
+        return "", 0
+
+    def _known(self, entry: Entry, content: str) -> int | None:
+        return self.store.known_revision(entry.server, content, entry.identity)
+
+    def _standing(self, entry: Entry, revisions: Sequence[Revision], origins: Sequence[str]) -> Standing:
+        return stands(
+            entry.sha256, origins, revisions, lambda content: self._known(entry, content), entry.on_top_of
+        )
 
     def _upload(self, entry: Entry, base: int | None) -> Revision:
         progress = self.on_progress
@@ -521,10 +540,9 @@ class _SendRun:
         if entry.has_file or not entry.origin or entry.revision is not None:
             return entry
         revisions = self._revisions(entry.part_number)
-        both = [self._standing(entry, revisions, content) for content in (entry.sha256, entry.origin)]
-        stands = max(both, key=lambda one: one.base_number)
-        stands.check(entry.part_number)
-        base = stands.base
+        made_from = self._standing(entry, revisions, (entry.sha256, *entry.origin.split()))
+        made_from.check(entry.part_number)
+        base = made_from.base
         return (
             entry if base is None else replace(entry, revision=base.revision_number, sha256=checksum_of(base))
         )

@@ -37,11 +37,12 @@ from silo.bom.errors import ConflictError, DocumentError, InputError, counted
 from silo.bom.snapshot import to_plain
 from silo.checksums import content_hash
 from silo.folder_lock import folder_lock
-from silo.outbox.entry import ASKED, SAME_PART, Commit, CommitFields, Entry, State, on_top
+from silo.outbox.entry import ASKED, SAME_PART, UNKNOWN, Commit, CommitFields, Entry, State, on_top
 from silo.outbox.tables import SELECT, TABLES, VERSION, entry_of
 from silo.platform import (
     data_folder,
     hold_lock,
+    one_path,
     private_file,
     read_memory,
     remove_patiently,
@@ -51,9 +52,13 @@ from silo.platform import (
     stamp_of,
     sync_folder,
 )
+from silo.project_folder import FileRecord, record_of
 
 # What a saved file was made from is forgotten after two years.
 _REMEMBERED = 2 * 366 * 86400.0
+# Saves between two commits that are followed back.
+_LONGEST_LINEAGE = 1000
+_LOOK_FOR_IT = FileRecord("")
 # A copy of a file that was replaced is kept for so long, or until the user deletes it.
 KEPT_ASIDE_DAYS = 90
 _NEWEST_DAYS = 3
@@ -311,24 +316,22 @@ def _insert(db: sqlite3.Connection, table: str, values: Mapping[str, Any]) -> No
 class FileOrigins(QueueDatabase):
     """What files were made from, as far as it is known here."""
 
-    def origin_of(self, sha256: str) -> str:
-        """Return the SHA-256 of the committed file from which a file with this content was made, if that is
-        known here; the content's own hash if it was never saved over.
-
-        A file that was saved first and committed later is a committed file itself, even while it waits.
-        """
+    def lineage(self, sha256: str) -> list[str]:
+        """Return the contents from which FreeCAD saved a file with this content here, the nearest first."""
+        found: list[str] = []
         with self._open() as db:
-            row = db.execute(
-                "SELECT origin FROM derived WHERE sha256 = :sha256"
-                " AND NOT EXISTS (SELECT 1 FROM known WHERE sha256 = :sha256)"
-                " AND NOT EXISTS (SELECT 1 FROM entry WHERE sha256 = :sha256)",
-                {"sha256": sha256},
-            ).fetchone()
-        return str(row[0]) if row else sha256
+            content = sha256
+            while len(found) < _LONGEST_LINEAGE:
+                row = db.execute("SELECT origin FROM derived WHERE sha256 = ?", (content,)).fetchone()
+                if row is None or row[0] in (sha256, *found):
+                    break
+                content = str(row[0])
+                found.append(content)
+        return found
 
     def derived(self, sha256: str, origin: str) -> None:
-        """Note that a file was saved without being committed; it was made from ``origin``."""
-        if not sha256 or sha256 == origin:
+        """Note that FreeCAD saved a file with this content; it had read or written ``origin`` before."""
+        if not sha256 or sha256 == origin or not origin or origin == UNKNOWN:
             return
         with self.transaction() as db:
             db.execute("INSERT OR REPLACE INTO derived VALUES (?, ?, ?)", (sha256, origin, self.clock()))
@@ -500,24 +503,24 @@ class Store(FileOrigins):
                 remove_patiently(path)
         return False
 
-    def finish(self, key: str, source: Path | None = None, origin: str = "") -> str:
+    def finish(self, key: str, source: Path | None = None, parent: str = "") -> str:
         """Make the copy of a staged commit's file, from its second name rather than from ``source``.
 
         If the copy cannot be written, a commit with a second name stays and is tried again later. A commit
         without one is forgotten, and DocumentError says so. After an OutboxError the commit stays. A file
         that was written since the commit is not sent.
 
-        ``origin`` replaces that of the commit: the commit before it may have been copied only now. Returns
+        ``parent``: what FreeCAD had read or written before this file; else the commit's first origin. Returns
         the file's SHA-256, "" if there is no copy of it.
         """
         try:
-            self._finish(key, source, origin)
+            self._finish(key, source, parent)
         finally:
             self._has_come(key)
         entry = self.by_key(key)
         return entry.sha256 if entry is not None else ""
 
-    def _finish(self, key: str, source: Path | None, origin: str) -> None:
+    def _finish(self, key: str, source: Path | None, parent: str) -> None:
         entry = self.by_key(key)
         if entry is None or not entry.file_left or entry.sha256:
             return
@@ -548,12 +551,18 @@ class Store(FileOrigins):
                 )
                 return
             raise self._lost(entry, content, sentence) from error
-        values = {"origin": origin} if origin and entry.origin else {}
+        values = {"origin": self._made_from(entry, sha256, parent)} if entry.origin else {}
         place = _place(copy, entry.path)
         self.update(entry.id, state=State.WAITING, sha256=sha256, size=size, reason="", **place, **values)
         shutil.rmtree(self._held / key, ignore_errors=True)
         if self.by_key(key) is None:  # discarded meanwhile
             self._drop_files(entry)
+
+    def _made_from(self, entry: Entry, sha256: str, parent: str) -> str:
+        told = entry.origin.split()
+        self.derived(sha256, parent or told[0])
+        origins = self.origins(sha256, entry.path, entry.identity, entry.key)
+        return " ".join(dict.fromkeys([*origins, *(content for content in told if content != UNKNOWN)]))
 
     def _lost(self, entry: Entry, content: Path, reason: str) -> DocumentError:
         with suppress(OutboxError):  # a row that stays has no file: the next sending holds it and says so
@@ -666,6 +675,52 @@ class Store(FileOrigins):
         """
         where = "e.state <> 'held' AND e.server IN ('', ?) AND e.id > ? ORDER BY e.id LIMIT 1"
         return self._entry_where(where, canonical(server), after)
+
+    def origins(
+        self,
+        sha256: str,
+        path: str,
+        identity: str,
+        key: str = "",
+        record: FileRecord | None = _LOOK_FOR_IT,
+    ) -> tuple[str, ...]:
+        """Return what a file with this content was made from, the nearest first (:mod:`silo.file_state`).
+
+        These are what FreeCAD saved it from here, what of this file waits in the queue since its record was
+        written, the content of the record, and the content itself.
+
+        key
+            of the commit that asks; its own content is no origin.
+        record
+            of the file, where the caller has read it: a file that has moved has it at another place.
+        """
+        if record is _LOOK_FOR_IT:
+            record = record_of(path) if path else None
+        if record is not None and record.sha256 == sha256:
+            return (sha256,)
+        line = self.lineage(sha256)
+        with self._open() as db:
+            known = {
+                content
+                for content in line
+                if db.execute("SELECT 1 FROM known WHERE sha256 = ?", (content,)).fetchone()
+            }
+        real = one_path(path) if path else ""
+        since = record.since if record is not None else 0.0
+        waiting = [
+            entry
+            for entry in reversed(self.entries())
+            if entry.sha256 and entry.key != key and entry.identity.casefold() == identity.casefold()
+        ]
+        queued = [
+            entry.sha256
+            for entry in waiting
+            if entry.has_file and entry.path and entry.taken_at >= since and one_path(entry.path) == real
+        ]
+        recorded = [record.sha256] if record is not None and record.sha256 else []
+        told = known.union(recorded, (entry.sha256 for entry in waiting))
+        near = [content for content in line if content in told] + line[-1:]
+        return tuple(dict.fromkeys([*near, *queued, *recorded, sha256]))
 
     def bom(self, entry_id: int) -> tuple[str, str]:
         """Return the extraction and the merge request of an entry, as JSON; "" if there is none."""

@@ -63,8 +63,8 @@ CREATE TABLE pause (
     PRIMARY KEY (server, item)
 );
 CREATE TABLE derived (
-    sha256 TEXT PRIMARY KEY,               -- a file that was saved, and not committed
-    origin TEXT NOT NULL,                  -- the committed file that it was made from
+    sha256 TEXT PRIMARY KEY,               -- a file that FreeCAD saved
+    origin TEXT NOT NULL,                  -- what FreeCAD had read or written before
     at REAL NOT NULL
 );
 CREATE TABLE known (

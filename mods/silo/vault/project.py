@@ -16,11 +16,11 @@ import os
 import time
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
+from silo.api.address import canonical
 from silo.api.files import DocumentId
 from silo.api.revisions import checksum_of
 from silo.api.wire import Revision
@@ -37,28 +37,18 @@ from silo.bom.walk.links import extract, file_bom
 from silo.checksums import content_hash
 from silo.fcstd import Library
 from silo.fcstd.linked import recorded_paths
+from silo.file_state import ON_TOP, FileState, file_state, remembered_state
 from silo.files import documents_in
 from silo.locator import FoundFile, Locator
-from silo.outbox.entry import SAME_PART, UNKNOWN, Commit, InFile, new_key, on_top
+from silo.outbox.entry import SAME_PART, UNKNOWN, Commit, Entry, InFile, State, new_key, on_top
+from silo.outbox.recorded import arrived
 from silo.outbox.store import Store
 from silo.platform import one_path
-from silo.project_folder import Project, ProjectEntry
+from silo.project_folder import FileRecord, Project
 from silo.vault.revisions import file_revisions
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
-
-
-class ProjectState(StrEnum):
-    """How a file of the project stands to Silo."""
-
-    SAME = "same"  # is in Silo as it is here
-    NEW = "not in Silo"
-    EDITED = "edited"  # here, since it was committed or pulled
-    NEWER = "newer in Silo"  # and not edited here
-    BOTH = "edited, and newer in Silo"
-    WAITING = "waiting"  # its commit is in the queue
-    NO_ITEM = "of an item that this server does not have"
 
 
 @dataclass(frozen=True)
@@ -75,8 +65,8 @@ class ProjectFile:
         (identity, object) of each item in it, the main part first.
     bom
         of its assembly, None for a part; ``problem`` says why there is none though there might be one.
-    kept
-        what the project remembers of it.
+    record
+        of the file (:mod:`silo.project_folder`).
     moved_from
         its place before, which is empty now.
     """
@@ -90,14 +80,13 @@ class ProjectFile:
     held: tuple[tuple[str, str], ...] = ()
     bom: Extraction | None = field(default=None, repr=False)
     problem: str = ""
-    kept: ProjectEntry | None = None
+    record: FileRecord | None = None
     moved_from: str = ""
 
     @property
-    def base(self) -> str:
-        """Return the content from which the file was made, if the project remembers it; otherwise ""."""
-        is_same_document = self.kept is not None and self.kept.document.lower() == self.document.lower()
-        return self.kept.sha256 if is_same_document and self.kept is not None else ""
+    def own_record(self) -> FileRecord | None:
+        """Return its record, if that is of the document that the file is now."""
+        return self.record if self.record is not None and self.record.is_of(self.document) else None
 
 
 @dataclass(frozen=True)
@@ -128,7 +117,7 @@ class FileStanding:
     """A file and how it stands; ``newest``: its newest revision in Silo, None where there is none."""
 
     file: ProjectFile
-    state: ProjectState
+    state: FileState
     newest: Revision | None = None
 
 
@@ -174,7 +163,7 @@ def read_project(tops: Sequence[str], project: Project, *, hardware: bool = True
         raise InputError(f"{stray[0]} lies outside the project {project.root}; name its folder with --root")
     locator = Locator(project.root)
     order, unreadable, outside, missing = _reached(paths, locator, project)
-    noted = project.files()
+    noted = project.records()
     gone = {place: kept for place, kept in noted.items() if not os.path.exists(project.path(place))}
     files: list[ProjectFile] = []
     with Library(project.root) as library:
@@ -245,7 +234,7 @@ def _reached(
 
 
 def _read(
-    path: str, project: Project, noted: Mapping[str, ProjectEntry], library: Library, *, hardware: bool
+    path: str, project: Project, noted: Mapping[str, FileRecord], library: Library, *, hardware: bool
 ) -> ProjectFile:
     place = project.place(path) or path
     document, sha256 = library.open(path), content_hash(path)
@@ -259,10 +248,11 @@ def _read(
     held = held_items(document)
     main = [noted_files for noted_files in held if noted_files[0] == item]
     held = (*main, *(noted_files for noted_files in held if noted_files not in main))
-    kept = noted.get(place)
-    own = "" if item else (kept.document if kept is not None else "")
+    record = noted.get(place)
+    # A file that had an item and has it no longer is a document of its own.
+    own = record.document if record is not None and not record.item else ""
     return ProjectFile(
-        path, place, sha256, str(document.Uid), item or own, item or "", held, bom, problem, kept
+        path, place, sha256, str(document.Uid), item or own, item or "", held, bom, problem, record
     )
 
 
@@ -272,7 +262,7 @@ def _one_file_per_item(files: Sequence[ProjectFile]) -> tuple[list[ProjectFile],
     for file in sorted(
         files,
         key=lambda project_file: (
-            project_file.kept is None or project_file.kept.document != project_file.item,
+            project_file.record is None or not project_file.record.is_of(project_file.item),
             project_file.place,
         ),
     ):
@@ -284,18 +274,18 @@ def _one_file_per_item(files: Sequence[ProjectFile]) -> tuple[list[ProjectFile],
         if first.place != file.place:
             doubtful.append((file.place, first.place))
             if first.sha256 != file.sha256:
-                own = file.kept.document if file.kept and file.kept.document != file.item else ""
+                own = file.record.document if file.record and not file.record.is_of(file.item) else ""
                 file = replace(file, document=own, item="", held=(), bom=None)
         project_files.append(file)
     return project_files, doubtful
 
 
-def _moved(file: ProjectFile, gone: Mapping[str, ProjectEntry], files: Sequence[ProjectFile]) -> ProjectFile:
+def _moved(file: ProjectFile, gone: Mapping[str, FileRecord], files: Sequence[ProjectFile]) -> ProjectFile:
     """Give the file its previous place, if exactly one remembered file is gone and can only be this one."""
-    if file.kept is not None and (file.kept.document == file.document or not file.document):
+    if file.record is not None and (file.record.is_of(file.document) or not file.document):
         return file
-    rules: tuple[Callable[[ProjectEntry], bool], ...] = (
-        (lambda kept: bool(file.item) and kept.document.lower() == file.item.lower()),
+    rules: tuple[Callable[[FileRecord], bool], ...] = (
+        (lambda kept: bool(file.item) and kept.is_of(file.item)),
         (lambda kept: not file.item and kept.sha256 == file.sha256),
         (lambda kept: not file.item and bool(kept.uid) and kept.uid == file.uid),
     )
@@ -304,7 +294,7 @@ def _moved(file: ProjectFile, gone: Mapping[str, ProjectEntry], files: Sequence[
         places = [place for place, kept in gone.items() if kept.document not in taken and fits(kept)]
         if len(places) == 1:
             before = gone[places[0]]
-            return replace(file, document=before.document, kept=before, moved_from=places[0])
+            return replace(file, document=before.document, record=before, moved_from=places[0])
     return file
 
 
@@ -333,7 +323,7 @@ def name_documents(belonging: Belonging, client: SiloClient | None, *, new: bool
         for file in belonging.files
     ]
     named = {
-        new.place: ProjectEntry(new.document, "", new.uid)
+        new.place: FileRecord(new.document, uid=new.uid)
         for old, new in zip(belonging.files, files, strict=True)
         if not old.document
     }
@@ -370,33 +360,27 @@ def compare(belonging: Belonging, client: SiloClient | None, store: Store) -> li
     client
         None: the server cannot be asked now, and what the project remembers counts.
     """
-    newest = newest_files(belonging.files, client) if client is not None else _remembered(belonging.files)
+    newest = newest_files(belonging.files, client) if client is not None else {}
     strange = [
         project_file.item
         for project_file in belonging.files
         if project_file.item and project_file.document.lower() not in newest
     ]
     here = set(client.get_items_by_uuid(strange) if client is not None else strange)
-    waiting = {(entry.identity, entry.sha256) for entry in store.entries() if entry.file_left}
+    queued = {
+        (entry.identity.lower(), entry.sha256): entry.state for entry in store.entries() if entry.file_left
+    }
     standings = []
     for file in belonging.files:
         revision = newest.get(file.document.lower())
-        state = _state(file, revision, client)
-        if revision is None and file.item and file.item not in here:
-            state = ProjectState.NO_ITEM
-        if (file.document, file.sha256) in waiting and (state is not ProjectState.SAME or client is None):
-            state = ProjectState.WAITING
+        state = _state(file, revision, client, store)
+        if revision is None and file.item and file.item not in here and state is not FileState.SET_BACK:
+            state = FileState.UNKNOWN
+        waits = queued.get((file.document.lower(), file.sha256))
+        if waits is not None and state is not FileState.SAME:
+            state = FileState.HELD if waits is State.HELD else FileState.WAITING
         standings.append(FileStanding(file, state, revision))
     return standings
-
-
-def _remembered(files: Iterable[ProjectFile]) -> dict[str, Revision]:
-    """Return the content from which each file was made, as if it were the newest."""
-    return {
-        file.document.lower(): Revision(revision_number=0, file_checksum=file.base)
-        for file in files
-        if file.base
-    }
 
 
 def newest_files(files: Iterable[ProjectFile], client: SiloClient) -> dict[str, Revision]:
@@ -412,7 +396,11 @@ def newest_files(files: Iterable[ProjectFile], client: SiloClient) -> dict[str, 
         pass
     main = {file.document.lower(): file.held[0][0] for file in several if file.held}
     items = client.get_items_by_uuid(main.values())
-    revisions = _remembered(file for file in several if not file.held)
+    revisions: dict[str, Revision] = {
+        file.document.lower(): Revision(revision_number=0, file_checksum=record.sha256)
+        for file in several
+        if not file.held and (record := file.own_record) is not None and record.sha256
+    }
     for document, uuid in main.items():
         item = items.get(uuid)
         if item is not None and (by_name := file_revisions(client.revisions(item.part_number))):
@@ -420,20 +408,22 @@ def newest_files(files: Iterable[ProjectFile], client: SiloClient) -> dict[str, 
     return revisions
 
 
-def _state(file: ProjectFile, newest: Revision | None, client: SiloClient | None) -> ProjectState:
-    if newest is None:
-        return ProjectState.NEW
-    there, base = checksum_of(newest), file.base
-    if there == file.sha256:
-        return ProjectState.SAME
-    if there == base:
-        return ProjectState.EDITED
-    if not there:  # a server without checksums: what was committed from here is all that is known
-        return ProjectState.SAME if base == file.sha256 else ProjectState.EDITED
-    if base == file.sha256 or client is None:
-        return ProjectState.NEWER
-    older = {checksum_of(revision) for revision in client.revisions(address_of(file, client))}
-    return ProjectState.NEWER if file.sha256 in older else ProjectState.BOTH
+def _state(file: ProjectFile, newest: Revision | None, client: SiloClient | None, store: Store) -> FileState:
+    record = file.own_record
+    if client is None:
+        return remembered_state(file.sha256, record)
+    server = client
+
+    def revisions() -> Sequence[Revision]:
+        return server.revisions(address_of(file, server))
+
+    def number(content: str) -> int | None:
+        return store.known_revision(server.base_url, content, file.document)
+
+    origins: Sequence[str] = ()
+    if newest is not None and checksum_of(newest) != file.sha256:
+        origins = store.origins(file.sha256, file.path, file.document, record=file.record)
+    return file_state(file.sha256, origins, record, newest, canonical(server.base_url), revisions, number)
 
 
 def address_of(file: ProjectFile, client: SiloClient) -> str:
@@ -461,10 +451,9 @@ def commits(
     users = _users(belonging)
     for standing in standings:
         file = standing.file
-        wanted = standing.state in (ProjectState.NEW, ProjectState.EDITED) or (
-            standing.state is ProjectState.BOTH and file.path in over_newer
-        )
-        bom = file.bom if file.item and (wanted or (boms and standing.state is ProjectState.SAME)) else None
+        is_over = standing.state in ON_TOP and file.path in over_newer
+        wanted = standing.state in (FileState.NEW, FileState.EDITED) or is_over
+        bom = file.bom if file.item and (wanted or (boms and standing.state is FileState.SAME)) else None
         if not wanted and bom is None:
             continue
         commit = Commit(
@@ -479,14 +468,39 @@ def commits(
             extraction=bom,
             allow_missing=allow_missing,
             remark=file.problem,
-            origin=(file.base or UNKNOWN) if wanted else file.sha256,
+            origin=UNKNOWN if wanted else file.sha256,
             document=InFile(file.held, not file.item, users.get(file.place, "")).to_json(),
             renamed=SAME_PART if file.moved_from else "",
         )
-        if standing.state is ProjectState.BOTH and standing.newest is not None:
+        if is_over and standing.newest is not None:
             newer = standing.newest.model_dump(mode="json", exclude={"properties", "links"})
+            newer["set_back"] = standing.state is FileState.SET_BACK
             commit = replace(commit, **on_top(comment, newer))
         yield file, commit
+
+
+def left_in_queue(belonging: Belonging, store: Store, mine: Container[str] = ()) -> list[Entry]:
+    """Return the commits of these files that are not in Silo yet, also those of an earlier run.
+
+    mine
+        keys of commits that count whatever they are of.
+    """
+    documents = {file.document.lower() for file in belonging.files if file.document}
+    paths = {file.path for file in belonging.files}
+    return [
+        entry
+        for entry in store.entries()
+        if entry.key in mine or entry.identity.lower() in documents or entry.path in paths
+    ]
+
+
+def retry_held(belonging: Belonging, store: Store, over: Container[str]) -> None:
+    """Let held commits of these files go on top of the newer revisions that held them, at a person's word."""
+    documents = {file.document.lower(): file.path for file in belonging.files if file.document}
+    for entry in store.entries():
+        path = documents.get(entry.identity.lower(), "")
+        if entry.state is State.HELD and entry.newer and not entry.superseded and path in over:
+            store.retry(entry.id)
 
 
 def _users(belonging: Belonging) -> dict[str, str]:
@@ -505,10 +519,10 @@ def _users(belonging: Belonging) -> dict[str, str]:
 
 
 def keep(project: Project, store: Store, file: ProjectFile, commit: Commit, server: str) -> None:
-    """Put a commit into the queue, and remember its content as the base of later edits."""
+    """Put a commit into the queue. A file that has moved takes its record along."""
+    if file.moved_from and file.record is not None:
+        project.note({file.moved_from: None, file.place: file.record})
     store.add(commit, server)
-    if commit.file is not None:
-        remember(project, [file])
 
 
 def send_along(
@@ -527,14 +541,7 @@ def send_along(
         return 0
     belonging = name_documents(belonging, client)
     standings = compare(belonging, client, store)
-    remember(
-        belonging.project,
-        (
-            standing.file
-            for standing in standings
-            if standing.state in (ProjectState.SAME, ProjectState.WAITING)
-        ),
-    )
+    remember(belonging.project, standings, client)
     count = 0
     for file, commit in commits(belonging, standings, boms=False, **how):
         if file.path not in skip:
@@ -543,14 +550,22 @@ def send_along(
     return count
 
 
-def remember(project: Project, files: Iterable[ProjectFile]) -> None:
-    """Remember files as they are in Silo, or on their way there."""
-    noted: dict[str, ProjectEntry | None] = {}
-    for file in files:
-        kept = ProjectEntry(file.document, file.sha256, file.uid)
+def remember(project: Project, standings: Iterable[FileStanding], client: SiloClient | None) -> None:
+    """Write the records of files that are in Silo as they are here, where they say something else."""
+    if client is None:
+        return
+    server = canonical(client.base_url)
+    noted: dict[str, FileRecord | None] = {}
+    for standing in standings:
+        file, newest = standing.file, standing.newest
+        if standing.state is not FileState.SAME or newest is None or not newest.revision_number:
+            continue
+        record = arrived(file.document, file.sha256, newest, server, file.uid, item=bool(file.item))
+        before = file.record
+        if before is not None and replace(before, since=record.since) == record and not file.moved_from:
+            continue
         if file.moved_from:
             noted[file.moved_from] = None
-        if kept != file.kept or file.moved_from:
-            noted[file.place] = kept
+        noted[file.place] = record
     if noted:
         project.note(noted)

@@ -19,20 +19,21 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from silo.api.address import canonical
 from silo.bom.errors import DocumentError
 from silo.checksums import content_hash
 from silo.fcstd import Library
 from silo.fcstd.linked import identity_in
+from silo.file_state import FileState, file_state
 from silo.locator import refusal
+from silo.outbox.recorded import arrived, uid_of
 from silo.platform import folded, one_path, replacing
-from silo.project_folder import Project, ProjectEntry
+from silo.project_folder import FileRecord, Project, record_of
 from silo.vault.tree import Fetched, FileTree, LostLink
 
 if TYPE_CHECKING:
-    pass
-
-
-"""Called with the name of the file that is fetched now, and how many were."""
+    from silo.api.client import SiloClient
+    from silo.outbox.store import Store
 
 
 class PullState(StrEnum):
@@ -42,8 +43,14 @@ class PullState(StrEnum):
     SAME = "same"  # was there already
     UPDATED = "updated"  # replaced an older revision
     EDITED = "edited"  # local edits that are not in Silo: not touched
+    WAITING = "waiting"  # its commit is in the queue, and not in Silo yet: not touched
+    SET_BACK = "server set back"  # it is of a revision that the server has lost: not touched
     OVERWRITTEN = "overwritten"  # local edits, replaced at the user's word; a copy is kept
     OPEN = "open"  # FreeCAD has it open: not touched
+
+
+LEFT_ALONE = frozenset({PullState.EDITED, PullState.WAITING, PullState.SET_BACK, PullState.OPEN})
+"""The states of files that were not touched, though Silo has another one."""
 
 
 @dataclass(frozen=True)
@@ -68,9 +75,7 @@ class Pulled:
     @property
     def complete(self) -> bool:
         """Return True if every file is there in the wanted revision."""
-        return not self.lost and not any(
-            file.state in (PullState.EDITED, PullState.OPEN) for file in self.files
-        )
+        return not self.lost and not any(file.state in LEFT_ALONE for file in self.files)
 
 
 # --- lay out ---------------------------------------------------------------------------------------------
@@ -136,12 +141,50 @@ class Rules:
         FreeCAD has this file open, and its next save would undo what is written.
     learn
         called with each file as it is in Silo: (SHA-256, item, revision).
+    state
+        returns how the file at a path stands, with this content, to the one that was fetched.
+    server
+        from which the files come, for their records.
     """
 
     overwrite: bool = False
     keep: Callable[[str], Path | None] = lambda _path: None
     is_open: Callable[[str], bool] = lambda _path: False
     learn: Callable[[str, str, int], object] = lambda _sha256, _item, _revision: None
+    state: Callable[[str, str, Fetched], FileState] = lambda _path, _sha256, _one: FileState.BOTH
+    server: str = ""
+
+
+def rules_of(
+    store: Store, client: SiloClient, *, overwrite: bool = False, is_open: Callable[[str], bool]
+) -> Rules:
+    """Make the rules of a pull for this computer: its queue, its records, and what its FreeCAD saved."""
+    server = canonical(client.base_url)
+
+    def state(path: str, sha256: str, one: Fetched) -> FileState:
+        record = record_of(path)
+        own = record if record is not None and record.is_of(one.item) else None
+        revisions = one.revisions
+        origins = store.origins(sha256, path, one.item, record=record)
+        found = file_state(
+            sha256,
+            origins,
+            own,
+            revisions[0] if revisions else None,
+            server,
+            lambda: revisions,
+            lambda content: store.known_revision(server, content, one.item),
+        )
+        waits = any(
+            entry.file_left and entry.sha256 == sha256 and entry.identity.lower() == one.item.lower()
+            for entry in store.entries()
+        )
+        return FileState.WAITING if waits and found is not FileState.SAME else found
+
+    def learn(sha256: str, item: str, number: int) -> None:
+        store.learn(server, sha256, item, number)
+
+    return Rules(overwrite, store.keep_aside, is_open, learn, state, server)
 
 
 def place(tree: FileTree, into: Path | str, rules: Rules = Rules()) -> Pulled:
@@ -154,7 +197,7 @@ def place(tree: FileTree, into: Path | str, rules: Rules = Rules()) -> Pulled:
     places = lay_out((file.position, file.revision.file_path) for file in tree.files)
     anchor = _anchor(tree, places, base)
     placed: list[PulledFile] = []
-    noted: dict[str, ProjectEntry | None] = {}
+    noted: dict[str, FileRecord | None] = {}
     lost = list(tree.lost)
     # The disk says which names are one file: by their case, their Unicode form, or a link.
     taken: dict[str, PulledFile] = {}
@@ -172,19 +215,13 @@ def place(tree: FileTree, into: Path | str, rules: Rules = Rules()) -> Pulled:
             continue
         placed.append(_place(one, target, rules))
         taken[one_path(str(target))] = placed[-1]
-        if placed[-1].state not in (PullState.EDITED, PullState.OPEN):
-            noted[str(target)] = ProjectEntry(one.item, one.sha256, _uid_of(target))
+        if placed[-1].state not in LEFT_ALONE:
+            item = bool(one.part_number)
+            uid, server = uid_of(str(target)), rules.server
+            noted[str(target)] = arrived(one.item, one.sha256, one.revision, server, uid, item=item)
     project = Project.of(anchor) or Project(one_path(str(anchor)))
     project.note({at: kept for path, kept in noted.items() if (at := project.place(path)) is not None})
     return Pulled(placed[0].path, tuple(placed), tuple(lost))
-
-
-def _uid_of(path: Path) -> str:
-    try:
-        with Library() as library:
-            return str(library.glance(path).Uid)
-    except DocumentError:
-        return ""
 
 
 def _in_the_way(target: Path, base: Path) -> str:
@@ -215,8 +252,11 @@ def _place(one: Fetched, target: Path, rules: Rules) -> PulledFile:
                 return done(PullState.OPEN)
             state = PullState.UPDATED
             if there not in one.earlier:
+                stands = rules.state(str(target), there, one)
+                if stands is FileState.SET_BACK:
+                    return done(PullState.SET_BACK)
                 if not rules.overwrite:
-                    return done(PullState.EDITED)
+                    return done(PullState.WAITING if stands is FileState.WAITING else PullState.EDITED)
                 state, kept = PullState.OVERWRITTEN, rules.keep(str(target))
         # Through a link to where the file is: another assembly may use it there.
         with one.content.open("rb") as read, replacing(real, mode=0o644) as write:

@@ -58,8 +58,8 @@ class Fetched:
         relative to the folder of the top file, with ``/``; may begin with ``../``.
     part_number, item
         of the file's item; a file of several items or none has no number, and ``item`` is its document.
-    earlier
-        the hashes of the item's revisions: such a file may be replaced, it is in Silo.
+    revisions
+        all of its file, the newest first.
     """
 
     position: str
@@ -68,7 +68,12 @@ class Fetched:
     revision: Revision
     content: Path
     sha256: str
-    earlier: frozenset[str] = frozenset()
+    revisions: tuple[Revision, ...] = ()
+
+    @property
+    def earlier(self) -> frozenset[str]:
+        """Return the hashes of its revisions: such a file may be replaced, it is in Silo."""
+        return frozenset(filter(None, map(checksum_of, self.revisions)))
 
 
 @dataclass(frozen=True)
@@ -182,9 +187,9 @@ class _Fetch:
             raise InputError(f"more than {self.most} files are not fetched in one go")
         self.progress(posixpath.basename(position), len(self.files))
         content, sha256 = self.content(holder.of, revision)
-        earlier = frozenset(filter(None, map(checksum_of, self.revisions(holder))))
+        revisions = tuple(self.revisions(holder))
         self.files[position] = Fetched(
-            position, holder.part_number, holder.id, revision, content, sha256, earlier
+            position, holder.part_number, holder.id, revision, content, sha256, revisions
         )
         try:
             recorded = recorded_paths(content)

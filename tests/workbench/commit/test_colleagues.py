@@ -380,9 +380,9 @@ def test_a_bom_alone_of_a_file_that_was_saved_since(office: Office, flow: Commit
     top, bolt = two_bolts(office, flow)
     edit(top, b"with the times at which its parts were saved")
     office.desk.documents.save(top)
-    office.desk.documents.base(top).origin = sha256(b"two bolts").hexdigest()
+    office.desk.documents.base(top).content = sha256(b"two bolts").hexdigest()
     top.parts[bolt] = 3
     flow.sync_only(top)
     office.settle()
     assert (bolts(office), office.session.shown.waiting) == ([3], ())
-    assert office.desk.documents.base(top).origin == sha256(b"two bolts").hexdigest()
+    assert office.desk.documents.base(top).content == sha256(b"two bolts").hexdigest()

@@ -77,7 +77,7 @@ def test_a_sync_does_not_undo_a_colleagues_newer_file(
     number = "M01-0001"
     Path(top.FileName).write_bytes(b"three plates")
     office.silo.upload_file(number, top.FileName, "mine")
-    office.desk.documents.base(top).origin = sha256(b"three plates").hexdigest()
+    office.desk.documents.base(top).content = sha256(b"three plates").hexdigest()
     window = opened(office, flow, top)
     sync(office, window)
     theirs = office.folder / "theirs.FCStd"

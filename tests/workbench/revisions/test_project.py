@@ -128,7 +128,7 @@ def test_unsaved_edits_are_shown_saved_and_sent(place: Place) -> None:
     edited = place.write("edited")
     path.write_bytes(before)
     doc = place.opened(Document("Plate", str(path), edited, place.identity))
-    place.office.desk.documents.base(doc).settle(place.office.session.outbox)  # as when it is opened
+    place.office.desk.documents.base(doc).settle()  # as when it is opened
     doc.recomputed = True  # FreeCAD marks it, but nothing differs
     assert not any(row.edits for row in place.look(flow).rows)
     doc.recomputed = False

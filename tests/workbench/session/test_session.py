@@ -208,7 +208,7 @@ def test_a_commit_that_a_full_disk_kept_is_not_reported_as_lost(office: Office, 
     keep(office, made, base)
     office.session._waits(((), None))  # read before there was anything
     office.settle()
-    assert base.origin == hashlib.sha256(b"content").hexdigest()  # the next commit is made from this one
+    assert base.content == hashlib.sha256(b"content").hexdigest()  # the next commit is made from this one
     assert any("Bolt: The commit is kept. It is sent as soon" in line for line in office.console)
     disk.room = True
     office.session.tick()
@@ -232,7 +232,7 @@ def test_a_document_knows_what_it_is_made_from_whoever_sends_its_commit(
     slow.gate.set()
     office.settle()
     assert office.session.shown.waiting == ()
-    assert base.origin == hashlib.sha256(b"content").hexdigest()
+    assert base.content == hashlib.sha256(b"content").hexdigest()
 
 
 def test_who_does_not_want_to_wait_loses_nothing_either(office: Office, slow: SlowStore) -> None:

@@ -63,21 +63,23 @@ def run_status(args: argparse.Namespace) -> int:
 
 
 def run_commit(args: argparse.Namespace) -> int:
-    """Send what differs, through the queue. Returns 1 if anything is not in Silo afterwards; 3 if the server
-    does not answer: then the queue keeps everything that the project does not remember as sent.
+    """Send what differs, through the queue. Returns 1 if anything is not in Silo afterwards, also what an
+    earlier run left; 3 if the server does not answer: then the queue keeps everything.
     """
+    from silo.file_state import FileState
     from silo.outbox.report import Report
     from silo.outbox.send import send_all
     from silo.outbox.store import Store
     from silo.vault.project import (
-        ProjectState,
         commits,
         compare,
         find_project,
         keep,
+        left_in_queue,
         name_documents,
         read_project,
         remember,
+        retry_held,
     )
 
     belonging = read_project(args.tops, find_project(args.tops, args.root))
@@ -90,15 +92,13 @@ def run_commit(args: argparse.Namespace) -> int:
             away = error
         there = None if away else client
         belonging = name_documents(belonging, there)
+        over = {file.path for file in belonging.files} if args.on_top else set()
+        retry_held(belonging, store, over)
         standings = compare(belonging, there, store)
         if not args.json:
             _show(belonging, standings)
-        remember(
-            belonging.project,
-            (standing.file for standing in standings if standing.state is ProjectState.SAME),
-        )
+        remember(belonging.project, standings, there)
         mine = set()
-        over = {file.path for file in belonging.files} if args.on_top else set()
         options = {"allow_missing": args.allow_missing, "over_newer": over}
         for file, commit in commits(belonging, standings, comment=args.comment or "", **options):
             keep(belonging.project, store, file, commit, client.base_url if there else "")
@@ -109,10 +109,12 @@ def run_commit(args: argparse.Namespace) -> int:
             else send_all(store, client, force=True, on_progress=set_sending_step)
         )
         models, undrawn = (0, []) if report.stopped_by else _send_models(belonging, client)
-    left = [entry for entry in store.entries() if entry.key in mine]
-    refused = {ProjectState.NEWER, ProjectState.NO_ITEM} | (set() if args.on_top else {ProjectState.BOTH})
+        # What Silo has now proves the commit: whatever differs is not what a pull would bring.
+        after = compare(belonging, None if report.stopped_by else there, store)
+    left = left_in_queue(belonging, store, mine)
     sent = _sent(report, mine)
-    behind = [standing for standing in standings if standing.state in refused]
+    waits = (FileState.WAITING, FileState.HELD)
+    behind = [one for one in after if one.state is not FileState.SAME and one.state not in waits and not away]
     incomplete = [sent_row for sent_row in sent if sent_row["bom"] == "blocked"]
     if args.json:
         waiting = [{"path": entry.label, "reason": entry.reason} for entry in left]
@@ -173,7 +175,7 @@ def _status_json(belonging: Belonging, standings: list[FileStanding]) -> dict[st
         "files": [
             {
                 "path": standing.file.place,
-                "state": standing.state.name.lower().replace("_", " "),
+                "state": standing.state.value,
                 "document": standing.file.document or None,
                 "items": len({item for item, _ in standing.file.held}),
                 "moved_from": standing.file.moved_from or None,
@@ -196,7 +198,20 @@ _MARKS = {
     "NEWER": ("↓", "cyan"),
     "BOTH": ("✗", "red"),
     "WAITING": ("…", "yellow"),
-    "NO_ITEM": ("✗", "red"),
+    "HELD": ("✗", "red"),
+    "SET_BACK": ("↑", "red"),
+    "UNKNOWN": ("✗", "red"),
+}
+_WORDS = {
+    "SAME": "same",
+    "NEW": "not in Silo",
+    "EDITED": "edited",
+    "NEWER": "newer in Silo",
+    "BOTH": "edited, and newer in Silo",
+    "WAITING": "waiting",
+    "HELD": "held: its commit needs your choice",
+    "SET_BACK": "newer than the server, which was restored from a backup",
+    "UNKNOWN": "of an item that this server does not have",
 }
 
 
@@ -212,7 +227,7 @@ def _show(belonging: Belonging, standings: list[FileStanding]) -> None:
         line = (
             Text(f"{mark} ", style)
             .append(plain(standing.file.place))
-            .append(f"  {spoken(standing.state.value)}", style)
+            .append(f"  {spoken(_WORDS[standing.state.name])}", style)
         )
         if standing.newest is not None:
             line.append(spoken(f"  revision {standing.newest.revision_number}"), "dim")
@@ -262,8 +277,10 @@ def _show_sent(
         advice = {
             "NEWER": "was not sent: silo-mod pull fetches the newer file",
             "BOTH": "was not sent: look at the newer file (silo-mod log); --on-top sends yours on top of it",
-            "NO_ITEM": "was not sent: is this the right server? Else take the identity out and register it",
-        }[late.state.name]
+            "SET_BACK": "was not sent: the server was restored from a backup; --on-top sends all such "
+            "files again",
+            "UNKNOWN": "was not sent: is this the right server? Else take the identity out and register it",
+        }.get(late.state.name, "was written while it was sent: commit it again")
         out.print(Text("✗ ", "red").append(plain(f"{late.file.place} {spoken(advice)}")))
     if report.busy:
         out.print("Another program sends the queue now; what waits goes with it", style="yellow")

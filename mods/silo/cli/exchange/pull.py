@@ -49,17 +49,17 @@ def run_pull(args: argparse.Namespace) -> int:
     """Fetch an item's files into a folder. Returns 1 if a file was left alone, or is not in Silo."""
     from silo.freecads.open_documents import open_in_any
     from silo.outbox.store import Store
-    from silo.vault.pull import Rules, place, pulled_json
+    from silo.vault.pull import place, pulled_json, rules_of
     from silo.vault.tree import fetched
 
     store, into = Store(), Path(args.into)
     opened = open_in_any()
     with client_of(args) as client:
-        rules = Rules(
+        rules = rules_of(
+            store,
+            client,
             overwrite=args.replace,
-            keep=store.keep_aside,
             is_open=lambda path: not args.even_if_open and opened.has_file(path),
-            learn=lambda sha256, item, number: store.learn(client.base_url, sha256, item, number),
         )
         number = named_item(client, args.part_number).part_number
         progress = lambda name, count: set_step(f"fetching {name}, {counted(count, 'file')} so far")  # noqa: E731
@@ -79,6 +79,12 @@ _MARKS = {
     "updated": ("~", "yellow", "updated"),
     "edited": ("✗", "red", "has edits that are not in Silo; left alone (--replace replaces it)"),
     "overwritten": ("~", "yellow", f"replaced; your file is kept for {KEPT_ASIDE_DAYS} days at"),
+    "waiting": ("✗", "red", "waits in the queue; left alone (silo-mod queue, or --replace replaces it)"),
+    "server set back": (
+        "✗",
+        "red",
+        "is newer than the server, which was restored; left alone (silo-mod commit --on-top sends it)",
+    ),
     "open": ("✗", "red", "is open in FreeCAD; left alone (close it, or --even-if-open)"),
 }
 

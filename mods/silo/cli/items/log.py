@@ -60,7 +60,7 @@ def run_log(args: argparse.Namespace) -> int:
         item = _item_of(client, args.file, identity)
         revisions = client.revisions(item.part_number)
         shown = revisions[: args.limit]
-        here = _revision_on_disk(Store(), sha256_of(path), identity, client.base_url, revisions)
+        here = _revision_on_disk(Store(), path, sha256_of(path), identity, client.base_url, revisions)
         changes: dict[int, str] = {}
         if args.changes:
             files = file_revisions(revisions)
@@ -136,15 +136,17 @@ def _show_changes(args: argparse.Namespace, changes: ProductChanges) -> None:
 
 
 def _revision_on_disk(
-    store: Store, sha256: str, identity: str, server: str, revisions: list[Revision]
+    store: Store, path: str, sha256: str, identity: str, server: str, revisions: list[Revision]
 ) -> tuple[int | None, bool]:
     """Return the revision that the file is or was made from, and if it has edits since."""
-    from silo.api.revisions import standing
+    from silo.file_state import stands
 
-    for content, edited in ((sha256, False), (store.origin_of(sha256), True)):
-        number = store.known_revision(server, content, identity)
-        if (base := standing(revisions, content, number).base) is not None:
-            return base.revision_number, edited
+    def known(content: str) -> int | None:
+        return store.known_revision(server, content, identity)
+
+    for origins in ((), store.origins(sha256, path, identity)):
+        if (base := stands(sha256, origins, revisions, known).base) is not None:
+            return base.revision_number, bool(origins)
     return None, True
 
 

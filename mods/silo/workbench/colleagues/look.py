@@ -54,7 +54,9 @@ def look(
     for check in files:
         if (item := items.get(check.identity)) is None:
             continue
-        file = _CommitFile(check.path, item.part_number, check.identity, check.base.settle(outbox))
+        content = check.base.settle()
+        origins = (content, *outbox.origins(content, check.path, check.identity))
+        file = _CommitFile(check.path, item.part_number, check.identity, origins)
         if (stands := file.standing(client, outbox)) is not None:
             lines: tuple[ThreeLines, ...] = ()
             with suppress(SiloError):  # the question stands without its details
@@ -103,7 +105,8 @@ def look_held(
         mine = top_of(from_plain(json.loads(extraction)))
     except ValueError:
         return None  # sending it says so
-    file = _CommitFile(entry.path, entry.part_number, entry.identity, entry.origin)
+    origins = tuple(entry.origin.split())
+    file = _CommitFile(entry.path, entry.part_number, entry.identity, origins)
     stands = file.standing(client, outbox)
     return None if stands is None else file.theirs(stands, file.lines(client, stands, mine, cancelled))
 
@@ -113,18 +116,20 @@ class _CommitFile:
     path: str
     part_number: str
     identity: str
-    origin: str
+    origins: tuple[str, ...]
 
     def standing(self, client: SiloClient, outbox: Store) -> Standing | None:
         """Compare the file with the item's revisions; None if committing it would undo nothing."""
-        from silo.api.revisions import is_newest, standing
+        from silo.file_state import stands
+
+        def number(content: str) -> int | None:
+            return outbox.known_revision(client.base_url, content, self.identity)
 
         # The newest one decides it nearly always; an item may have hundreds.
-        if is_newest(self.origin, client.revisions(self.part_number, newest=1)):
+        if stands("", self.origins, client.revisions(self.part_number, newest=1), number).base is not None:
             return None
-        revision = outbox.known_revision(client.base_url, self.origin, self.identity)
-        stands = standing(client.revisions(self.part_number), self.origin, revision)
-        return None if stands.newer is None else stands
+        found = stands("", self.origins, client.revisions(self.part_number), number)
+        return None if found.newer is None else found
 
     def lines(
         self, client: SiloClient, stands: Standing, mine: ComparedAssembly | None, cancelled: Cancel | None

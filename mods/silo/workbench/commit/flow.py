@@ -295,7 +295,9 @@ class CommitFlow:
         base = documents.base(doc)
         as_saved = not is_edited(documents, doc) and not base.replaced
         content = sha256_of(commit.path) if as_saved else ""
-        return replace(commit, origin=base.settle(self._session.outbox), sha256=content)
+        made_from = base.settle()
+        origins = (made_from, *self._session.outbox.origins(made_from, commit.path, commit.identity))
+        return replace(commit, origin=" ".join(dict.fromkeys(origins)), sha256=content)
 
     def send(self, doc: Any, comment: str) -> None:
         """Send a document that has just been saved, as it is."""
@@ -340,7 +342,7 @@ class CommitFlow:
             return
         commit = replace(commit, stamp=taken.stamp)
         if base is not None and not row.is_new:
-            commit = replace(commit, origin=base.origin or UNKNOWN)
+            commit = replace(commit, origin=base.content or UNKNOWN)
         if newer := row.on_top:
             commit = replace(commit, **on_top(comment, newer))
         self._session.keep(commit, failed=lambda error: self._tell_error(row.label, str(error)), base=base)

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What each open document was made from: the committed file whose content FreeCAD read.
+"""Which content of its file each open document has: what FreeCAD read or wrote last.
 
 A document observer. A file is known by its content, so it is hashed when FreeCAD opens it, by a worker; the
-stamp that is taken at once says later whether somebody else has replaced the file since. What a document was
-made from stays the same over its own saves, until a commit of it is copied to the outbox.
+stamp that is taken at once says later whether somebody else has replaced the file since. Each save is noted
+with the content before it, so that the queue knows what a file was made from, whoever committed it
+(:meth:`silo.outbox.store.Store.origins`).
 """
 
 from __future__ import annotations
@@ -30,8 +31,6 @@ def _stamp(path: str) -> Stamp | None:
 class Origins(Protocol):
     """What is remembered of saved files; :class:`silo.outbox.store.Store` has it."""
 
-    def origin_of(self, sha256: str, /) -> str: ...
-
     def derived(self, sha256: str, origin: str, /) -> None: ...
 
 
@@ -40,29 +39,35 @@ class DocumentOrigin:
 
     stamp
         the file as this document read or wrote it last; None where there was none.
-    origin
-        SHA-256 of the committed file; "" while nobody has looked yet.
+    content
+        its SHA-256; "" while nobody has looked yet.
     since
         seconds of :func:`time.monotonic`: when it was opened, or committed last.
     """
 
     # No dataclass: to make one costs FreeCAD's start a millisecond.
-    def __init__(self, path: str, stamp: Stamp | None, origin: str = "", since: float | None = None) -> None:
-        self.path, self.stamp, self.origin = path, stamp, origin
+    def __init__(self, path: str, stamp: Stamp | None, content: str = "", since: float | None = None) -> None:
+        self.path, self.stamp, self.content = path, stamp, content
         self.since = time.monotonic() if since is None else since
         self._lock = threading.Lock()
 
-    def settle(self, origins: Origins) -> str:
-        """Return the origin, and determine it first if that was not done yet. From any thread; reads the file
-        once.
+    def settle(self) -> str:
+        """Return the content, and determine it first if that was not done yet. From any thread; reads the
+        file once.
         """
         with self._lock:
-            if not self.origin:
+            if not self.content:
                 from silo.outbox.entry import UNKNOWN
 
-                content = _unchanged_hash(self.path, self.stamp)
-                self.origin = origins.origin_of(content) if content else UNKNOWN
-            return self.origin
+                self.content = _unchanged_hash(self.path, self.stamp) or UNKNOWN
+            return self.content
+
+    def saved(self, origins: Origins, stamp: Stamp | None) -> None:
+        """Note the content of a save, and the one before it. From any thread."""
+        with self._lock:
+            if content := _unchanged_hash(self.path, stamp):
+                origins.derived(content, self.content)
+                self.content = content
 
     def committed(self, sha256: str) -> None:
         """Note that a commit of the document has this content; later states are made from it.
@@ -72,7 +77,7 @@ class DocumentOrigin:
         """
         if sha256 := sha256 or _unchanged_hash(self.path, self.stamp):
             with self._lock:
-                self.origin, self.since = sha256, time.monotonic()
+                self.content, self.since = sha256, time.monotonic()
 
     @property
     def replaced(self) -> bool:
@@ -129,7 +134,7 @@ class Opened:
             self._work(call)
 
     def _settle(self, base: DocumentOrigin) -> None:
-        base.settle(self._outbox())
+        base.settle()
 
     # FreeCAD calls these; an exception in them would only be printed.
 
@@ -159,7 +164,7 @@ class Opened:
         done yet.
         """
         base = self._bases.get(doc.Name)
-        if base is not None and base.path == filename and not base.origin:
+        if base is not None and base.path == filename and not base.content:
             self._settle(base)
 
     def slotFinishSaveDocument(self, doc: Any, filename: str) -> None:
@@ -168,10 +173,5 @@ class Opened:
         if base is None or os.path.realpath(filename) != os.path.realpath(doc.FileName or ""):
             return
         base.path, base.stamp = doc.FileName, _stamp(doc.FileName)
-        stamp, origin = base.stamp, base.origin
-
-        def remember() -> None:
-            self._outbox().derived(_unchanged_hash(base.path, stamp), origin)
-
-        if origin:
-            self._later(remember)
+        stamp = base.stamp
+        self._later(lambda: base.saved(self._outbox(), stamp))

@@ -277,17 +277,17 @@ class RevisionFlow:
         outbox = self._session.outbox
 
         def run(client: SiloClient, control: Control) -> Pulled:
-            from silo.vault.pull import Rules, place
+            from silo.vault.pull import place, rules_of
             from silo.vault.tree import fetched
 
             def progress(name: str, count: int) -> None:
                 control.progress(f"{count + 1}: {plain(name, 60)}", None)
 
-            rules = Rules(
+            rules = rules_of(
+                outbox,
+                client,
                 overwrite=overwrite,
-                keep=outbox.keep_aside,
                 is_open=lambda path: real(path) in mine or self._desk.is_open_elsewhere(path),
-                learn=lambda sha256, item, number: outbox.learn(client.base_url, sha256, item, number),
             )
             with fetched(
                 client, part_number, revision, cancelled=control.cancelled, progress=progress
@@ -318,16 +318,20 @@ class RevisionFlow:
         outbox = self._session.outbox
 
         def run(client: SiloClient, _control: Control) -> ItemHistory:
-            from silo.api.revisions import standing
             from silo.bom.errors import NotFoundError
+            from silo.file_state import stands
 
             item = client.get_item_by_uuid(identity)
             if item is None:
                 raise NotFoundError(translate("Silo", "This server does not know the item of this document."))
             item_history = _history_of(client, item.part_number)
-            origin = base.settle(outbox)
-            number = outbox.known_revision(client.base_url, origin, identity)
-            made_from = standing(item_history.revisions, origin, number).base
+            content = base.settle()
+            origins = (content, *outbox.origins(content, base.path, identity))
+
+            def number(of: str) -> int | None:
+                return outbox.known_revision(client.base_url, of, identity)
+
+            made_from = stands("", origins, item_history.revisions, number).base
             return replace(item_history, base=made_from.revision_number if made_from is not None else None)
 
         self._session.ask(translate("Silo", "Asking Silo"), run, done, failed)

@@ -27,8 +27,8 @@ from silo.workbench.words import filled, plain, translate
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
+    from silo.file_state import FileState as StandState
     from silo.outbox.store import Store
-    from silo.vault.project import ProjectState as StandState
     from silo.workbench.settings.preferences import Preferences
 
 
@@ -59,7 +59,7 @@ class ProjectRow:
         """Return the tone for its state."""
         if self.is_fine:
             return Tone.GOOD
-        return Tone.WARNING if self.state.name in ("BOTH", "NO_ITEM") else Tone.CHANGED
+        return Tone.WARNING if self.state.name in ("BOTH", "HELD", "SET_BACK", "UNKNOWN") else Tone.CHANGED
 
     def words(self) -> str:
         """Describe its state, for people."""
@@ -70,7 +70,9 @@ class ProjectRow:
             "NEWER": translate("Silo", "newer in Silo"),
             "BOTH": translate("Silo", "edited, and newer in Silo"),
             "WAITING": translate("Silo", "waits to be sent"),
-            "NO_ITEM": translate("Silo", "its item is not on this server"),
+            "HELD": translate("Silo", "held for your choice"),
+            "SET_BACK": translate("Silo", "the server was restored from a backup: it has an older one"),
+            "UNKNOWN": translate("Silo", "its item is not on this server"),
         }
         row_words = [texts[self.state.name]]
         if self.edits:
@@ -200,7 +202,7 @@ class ProjectFlow:
 
 
 def _project_view(root: str, client: SiloClient | None, store: Store, edited: Set[str]) -> ProjectView:
-    from silo.vault.project import ProjectState as StandState
+    from silo.file_state import FileState as StandState
     from silo.vault.project import address_of, stand
 
     project = Project(one_path(root))
@@ -240,6 +242,6 @@ def file_in_project(folder: str, item: str) -> str:
     """Find the file of an item in a project; "" if there is none."""
     if (project := Project.of(folder)) is None:
         return ""
-    items = project.files().items()
+    items = project.records().items()
     paths = [project.path(place) for place, kept in items if kept.document.lower() == item.lower()]
     return next(filter(os.path.isfile, paths), "")

@@ -28,6 +28,10 @@ def left_alone(pulled: Pulled) -> Sequence[str]:
 
     texts = {
         PullState.EDITED: translate("Silo", "{name} has edits that are not in Silo; it was left alone."),
+        PullState.WAITING: translate("Silo", "{name} waits to be sent; it was left alone."),
+        PullState.SET_BACK: translate(
+            "Silo", "{name} is newer than the server, which was restored from a backup; it was left alone."
+        ),
         PullState.OPEN: translate("Silo", "{name} is open in FreeCAD; it was left alone."),
     }
     lines = [

@@ -151,7 +151,7 @@ class Session:
         self._colleagues.sending(commit.identity)
 
         def finish(_control: Control) -> None:
-            made_from, content = base.origin if base is not None and commit.origin else "", ""
+            made_from, content = base.content if base is not None and commit.origin else "", ""
             try:
                 content = self.outbox.finish(commit.key, commit.file, made_from)
             except (OutboxError, OSError) as error:
