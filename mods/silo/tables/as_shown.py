@@ -54,7 +54,7 @@ def as_shown(records: Sequence[SheetRow], grid: Grid, header: SheetRow, used: Se
                 break
             cells = [*row.cells, *[""] * (column + 1 - len(row.cells))]
             cells[column] = cell.text
-            made[index] = SheetRow(row.line, tuple(cells))
+            made[index] = row._replace(cells=tuple(cells))
     hidden = sorted({row for row, _ in grid.cells if row in grid.hidden_rows})
     struck = sorted({row for (row, _), cell in facts.items() if cell.struck})
     uncalculated = sum(cell.uncalculated for cell in grid.cells.values())

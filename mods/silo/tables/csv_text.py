@@ -49,27 +49,19 @@ def read_records(text: str, delimiter: str, source: str) -> list[SheetRow]:
     A quote that is never closed would hide all rows below it.
     """
     rows: list[SheetRow] = []
-    cells = 0
+    account = limits.TABLE.account(source)
     line = 1
     try:
         for row in _records(text, delimiter):
-            line = row.line
-            cells += len(row.cells)
             if len(row.cells) > limits.MOST_COLUMNS:
                 raise InputError(
                     f"{source}: line {row.line} has {len(row.cells)} cells; a table has at most "
                     f"{limits.MOST_COLUMNS} columns"
                 )
-            if len(rows) >= limits.MOST_ROWS or cells > limits.MOST_CELLS:
-                raise InputError(
-                    f"{source}: the table is too large: at most {limits.MOST_ROWS} rows and "
-                    f"{limits.MOST_CELLS} cells are read"
-                )
-            if any(len(cell) > limits.LONGEST_CELL for cell in row.cells):
-                raise InputError(
-                    f"{source}: line {row.line} has a cell of more than {limits.LONGEST_CELL} characters; "
-                    "a quote may be missing"
-                )
+            account.take_objects()
+            account.take_cells(len(row.cells))
+            for cell in row.cells:
+                account.check_text(cell)
             rows.append(row)
             line = row.line + sum(cell.count("\n") for cell in row.cells) + 1
     except csv.Error as error:

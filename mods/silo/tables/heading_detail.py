@@ -84,8 +84,8 @@ def price_heading(cell: str) -> PriceHeading | None:
         if words in _PACK_PRICES:
             return _rest(tokens[length:], currency, per_pack=True)
         role = alias(words)
-        if role is not None:
-            return _rest(tokens[length:], currency) if role[0] is Heading.PRICE else None
+        if role is not None and role[0] is Heading.PRICE:
+            return _rest(tokens[length:], currency)
     return None
 
 

@@ -3,12 +3,11 @@
 
 from __future__ import annotations
 
-MOST_BYTES = 64 * 1024 * 1024
-MOST_ROWS = 200_000
+from silo.budget import MIB, Budget
+
+TABLE = Budget(bytes=64 * MIB, objects=200_000, cells=2_000_000, depth=1, text=32_767)
+"""For one table: its bytes, rows (objects), cells, and the characters of a cell."""
 MOST_COLUMNS = 1_000
-MOST_CELLS = 2_000_000
-LONGEST_CELL = 32_767
-"""[characters] as in a spreadsheet program."""
 LONGEST_HEADING = 300
 """[characters] a longer text is no heading; what looks into headings may be quadratic in this."""
 LONGEST_AMOUNT = 60

@@ -10,12 +10,12 @@ its columns; cells that are missing at the end are empty.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import zip_longest
 
 from silo.bom.errors import InputError, counted
 from silo.bom.headers import Heading, missing_columns
-from silo.bom.numbers import parse_number
+from silo.bom.numbers import Mark, parse_number
 from silo.tables import limits
 from silo.tables.as_shown import as_shown
 from silo.tables.columns import Assigned, Columns, find_columns
@@ -67,11 +67,20 @@ class Sheet:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """How the user says that a file is read. ``header``: index of the heading among the file's records."""
+    """How the user says that a file is read.
+
+    header
+        index of the heading among the file's records.
+    columns
+        role → index of its column.
+    mark
+        the decimal mark of its numbers; None: as the numbers themselves show.
+    """
 
     delimiter: str
     header: int
-    columns: Assigned
+    columns: Assigned = field(default_factory=dict)
+    mark: Mark | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,11 +111,7 @@ def read_sheet(
     Raises InputError if there is no heading, if a row is longer than the heading, if quotes do not match,
     or if the given encoding does not fit.
     """
-    if len(data) > limits.MOST_BYTES:
-        raise InputError(
-            f"{source}: {len(data) / 1e6:.0f} MB is too large for a table "
-            f"(limit {limits.MOST_BYTES / 1e6:.0f} MB)"
-        )
+    limits.TABLE.account(source).take_bytes(len(data))
     if delimiter is not None and len(delimiter) != 1:
         raise InputError(f"a delimiter is one character, got “{delimiter}”")
     if data.startswith(STARTS):
@@ -146,16 +151,16 @@ def _from_workbook(
     continues: Continues | None,
 ) -> Sheet:
     sheets = [(grid, grid.rows()) for grid in read_workbook(data, source)]
+    usable = [
+        (grid, rows, best)
+        for grid, rows in sheets
+        if (best := _best_header([("", rows[: limits.HEADER_WITHIN])], kind, columns)) is not None
+    ]
     if layout is not None:
         if not sheets:
             raise InputError(f"{source}: wanted a workbook with a table, got one without a sheet")
-        usable = [(*sheets[0], _chosen(sheets[0][1], kind, layout, source))]
-    else:
-        usable = [
-            (grid, rows, best)
-            for grid, rows in sheets
-            if (best := _best_header([("", rows[: limits.HEADER_WITHIN])], kind, columns)) is not None
-        ]
+        grid, rows = usable[0][:2] if usable else sheets[0]
+        usable = [(grid, rows, _chosen(rows, kind, layout, source)), *usable[1:]]
     if not usable:
         near = _near([("", rows[: limits.HEADER_WITHIN]) for _, rows in sheets], kind)
         lines = [", ".join(row.cells) for _, rows in sheets for row in rows]
@@ -337,3 +342,22 @@ def _no_header(text: Sequence[str], kind: TableKind) -> str:
     if kind.any_name:
         words += ". Name the columns yourself, for example: --column name=Bauteil --column mass=Gewicht"
     return words
+
+
+def first_lines(
+    data: bytes, source: str, kind: TableKind, delimiter: str | None = None
+) -> tuple[str, list[tuple[str, ...]]]:
+    """Read the first lines of a file as cells, as far as possible, for a user to name the columns.
+
+    Returns the separator ("" for a workbook): the given one, else the one that makes most columns.
+    """
+    if data.startswith(STARTS):
+        sheets = [grid.rows()[: limits.HEADER_WITHIN] for grid in read_workbook(data, source)]
+        likely = [rows for rows in sheets if _best_header([("", rows)], kind, None)]
+        return "", [row.cells for row in next(iter([*likely, *sheets]), [])]
+    _, text = next(decodings(data, None, source, kind.code_pages))
+    tables = [(mark, first_records(text, mark)) for mark in delimiter or DELIMITERS]
+    best = _best_header(tables, kind, None)
+    widths = {mark: max((len(row.cells) for row in rows), default=0) for mark, rows in tables}
+    mark = best.delimiter if best else max(widths, key=lambda each: widths[each])
+    return mark, [row.cells for row in dict(tables)[mark]]

@@ -155,7 +155,7 @@ def _ods_cell(cell: Element, style: str | None, look: Callable[[str, str | None]
         text = ":".join(re.findall(r"\d+", cell.get(f"{_OFFICE}time-value", text))[:3])
     elif kind == "boolean":
         text = BOOLEANS.get(cell.get(f"{_OFFICE}boolean-value", ""), text)
-    return Cell(text or cell.get(f"{_OFFICE}string-value", ""), struck)
+    return Cell(text or cell.get(f"{_OFFICE}string-value", ""), struck, number=value is not None)
 
 
 def _ods_text(element: Element) -> str:

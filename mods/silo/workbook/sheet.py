@@ -20,18 +20,26 @@ class Cell(NamedTuple):
         True if a part of the text is struck out.
     uncalculated
         True for a formula without a value.
+    number
+        True if the cell holds a number: its text has a decimal point, whatever the sheet's language is.
     """
 
     text: str
     struck: bool = False
     uncalculated: bool = False
+    number: bool = False
 
 
 class SheetRow(NamedTuple):
-    """Cells of one record and the line of the file that it begins on (1 = first)."""
+    """Cells of one record and the line of the file that it begins on (1 = first).
+
+    numbers
+        indices of the cells that a workbook holds as numbers.
+    """
 
     line: int
     cells: tuple[str, ...]
+    numbers: frozenset[int] = frozenset()
 
 
 @dataclass(eq=False)
@@ -76,13 +84,20 @@ class Grid:
     def rows(self) -> list[SheetRow]:
         """Return the rows that are not empty, each up to its last cell with text."""
         by_row: dict[int, dict[int, str]] = {}
+        numbers: dict[int, set[int]] = {}
         covered = self.covered()
         for (row, column), cell in sorted(self.cells.items()):
             if (row, column) not in covered:
                 by_row.setdefault(row, {})[column] = cell.text
+                if cell.number:
+                    numbers.setdefault(row, set()).add(column)
         if sum(map(max, by_row.values())) > 10 * limits.MOST_CELLS:
             raise InputError(f"sheet “{self.name}” is too wide; delete the cells outside of the table")
         return [
-            SheetRow(row + 1, tuple(cells.get(column, "") for column in range(max(cells) + 1)))
+            SheetRow(
+                row + 1,
+                tuple(cells.get(column, "") for column in range(max(cells) + 1)),
+                frozenset(numbers.get(row, ())),
+            )
             for row, cells in by_row.items()
         ]

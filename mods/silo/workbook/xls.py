@@ -53,7 +53,7 @@ def read_xls(data: bytes) -> Iterator[Grid]:
                 else:
                     text = ("FALSE", "TRUE")[value] if kind == xlrd.XL_CELL_BOOLEAN else str(value)
                 struck = any(book.font_list[font].struck_out for font in fonts)
-                grid.put(row, column, Cell(text, struck, text == "=…"))
+                grid.put(row, column, Cell(text, struck, text == "=…", kind == xlrd.XL_CELL_NUMBER))
         yield grid
 
 

@@ -116,7 +116,7 @@ def _xlsx_cell(cell: Element, strings: list[Cell], styles: list[CellStyle], star
     elif kind == "s":
         text = strings[int(value)]
     elif kind == "n":
-        text = Cell(formatted(float(value), code, start))
+        text = Cell(formatted(float(value), code, start), number=True)
     else:
         text = Cell(BOOLEANS[value] if kind == "b" else iso_text(value) if kind == "d" else value)
     return text._replace(struck=struck or text.struck)
