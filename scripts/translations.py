@@ -258,10 +258,12 @@ def _texts_of_server(package: Path) -> Iterator[tuple[str, str, Path]]:
     from jinja2 import nodes
 
     from silo.api.wire import ItemTexts, LineTexts
+    from silo.tables.bom_rows import BOM
+    from silo.tables.price_rows import PRICES
     from silo_server import actors, schema
     from silo_server.services import releases, suppliers
-    from silo_server.services.bom.import_table import BOM, DELIMITERS
     from silo_server.web import render
+    from silo_server.web.import_page import DELIMITERS
 
     # Words that are stored, of columns and of the built-in schema; a site's own stay as they are.
     stored = [*actors.Role, *actors.Scope, *schema.ITEM_TYPES, *REL_TYPES, *releases.NUMBERED, "draft"]
@@ -272,9 +274,7 @@ def _texts_of_server(package: Path) -> Iterator[tuple[str, str, Path]]:
     for one in built_in.fields:
         stored += [one.label, one.title, one.description, *one.options]
     stored += [*built_in.domains.values(), *(category.name for category in built_in.categories.values())]
-    stored += [
-        role.replace("_", " ").capitalize() for table in (BOM, suppliers.TABLE) for role in table.roles
-    ]
+    stored += [role.replace("_", " ").capitalize() for table in (BOM, PRICES) for role in table.roles]
     yield from ((str(word), "", package / "schema" / "__init__.py") for word in stored if word)
     for path in sorted(package.rglob("*.py")):
         yield from texts_of_python(path)

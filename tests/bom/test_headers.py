@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import pytest
 
-from silo.bom.headers import Heading, alias, find_roles, missing_columns, normal
+from silo.bom.headers import Heading, alias, missing_columns, normal
+from silo.tables.columns import find_columns
+from silo.tables.kind import TableKind
 
 
 @pytest.mark.parametrize(
@@ -35,18 +37,22 @@ def test_a_word_in_a_header_is_not_the_header() -> None:
         assert alias(normal(header)) is None
 
 
+def _roles(header: list[str], roles: tuple[Heading, ...]) -> dict[str, int]:
+    return dict(find_columns(header, TableKind(roles, ())).at)
+
+
 def test_the_better_name_wins_then_the_first() -> None:
     """Wherever it stands."""
     header = ["Component", "Name", "Title", "Name"]
-    assert find_roles(header, (Heading.NAME, Heading.QUANTITY)) == {Heading.NAME: 1}
-    assert find_roles(header, (Heading.QUANTITY,)) == {}
+    assert _roles(header, (Heading.NAME, Heading.QUANTITY)) == {Heading.NAME: 1}
+    assert _roles(header, (Heading.QUANTITY,)) == {}
 
 
 def test_what_is_missing_is_said_with_what_was_seen() -> None:
     """And nothing where nothing is."""
     header = ["PN", " Colour ", ""]
-    at = find_roles(header, tuple(Heading))
-    assert missing_columns(header, at, (Heading.PART_NUMBER,)) == ""
-    text = missing_columns(header, at, (Heading.PART_NUMBER, Heading.QUANTITY))
+    at_heading = {Heading(role): place for role, place in _roles(header, tuple(Heading)).items()}
+    assert missing_columns(header, at_heading, (Heading.PART_NUMBER,)) == ""
+    text = missing_columns(header, at_heading, (Heading.PART_NUMBER, Heading.QUANTITY))
     assert text.startswith("there is no column 'Quantity'; the columns are PN, Colour. ")
     assert "'Quantity' may also be called qty, qnty, count" in text

@@ -23,6 +23,9 @@ from web_visitor import Visitor
 import silo_server
 from silo.bom.errors import BusyError, RejectedError
 from silo.bom.headers import Heading
+from silo.tables.bom_rows import BOM
+from silo.tables.limits import HEADER_WITHIN
+from silo.tables.sheet import Layout, first_lines
 from silo_server.db.database import Database
 from silo_server.db.rows import insert_rows
 from silo_server.db.tables import bom_lines, items
@@ -31,7 +34,7 @@ from silo_server.db.turnstile import Turnstile
 from silo_server.errors import TooLargeError
 from silo_server.run import RunningServer, running_server
 from silo_server.services.bom.decisions import Decision, ReviewAction, resolve
-from silo_server.services.bom.import_table import HEADER_WITHIN, Layout, first_lines, read_csv
+from silo_server.services.bom.imports import read_bom
 from silo_server.services.bom.last_sync import record_refusal
 from silo_server.services.bom.line_edit import add_line, change_line
 from silo_server.services.bom.line_state import state_columns
@@ -161,18 +164,18 @@ def test_a_structure_that_would_fill_the_memory_is_not_read(url: str, tmp_path: 
 def test_a_file_that_breaks_off_shows_what_can_be_read_of_it() -> None:
     """A quote too many in one row: the person sees the header, and can say which column is which."""
     data = b'Part number,Quantity\nA,1\n"B" x,2\n'
-    assert first_lines(data, ",") == [["Part number", "Quantity"], ["A", "1"]]
+    assert first_lines(data, "file", BOM) == (",", [("Part number", "Quantity"), ("A", "1")])
 
 
 def test_a_file_that_is_no_bom_is_not_read_to_its_end() -> None:
     """The header is looked for near the top; what stands at the end of such a file does not matter."""
     rows = b"a;b,c\td\n" * 5000
-    with pytest.raises(RejectedError, match="found none"):
-        read_csv(rows + b'"never closed', 20_000)
+    with pytest.raises(RejectedError, match="found no header line"):
+        read_bom(rows + b'"never closed', 20_000)
     with pytest.raises(TooLargeError):
-        read_csv(b"Part number,Quantity\n" + b"A,1\n" * 21 + b'"never closed', 20)
+        read_bom(b"Part number,Quantity\n" + b"A,1\n" * 21, 20)
     late = b"x\n" * (HEADER_WITHIN - 1) + b"Part number,Quantity\nA,1\n"
-    assert read_csv(late, 20)[0][1]["part_number"] == "A"
+    assert read_bom(late, 20).rows[0].texts["part_number"] == "A"
 
 
 @pytest.mark.parametrize(
@@ -190,12 +193,12 @@ def test_two_columns_of_one_meaning_that_differ_are_refused(
     """Neither is taken in silence; a person's choice of columns is, and so is what says the same twice."""
     data = f"A title\n{header}\n{differ}\n".encode()
     with pytest.raises(RejectedError, match=r"both mean the .* in row 3 they say") as caught:
-        read_csv(data, 20)
+        read_bom(data, 20)
     assert len(caught.value.problems) == 1
     layout = Layout(",", 1, {Heading.PART_NUMBER: 0, Heading.QUANTITY: 1})
-    assert read_csv(data, 20, layout)[0][1]["part_number"] == "A"
+    assert read_bom(data, 20, layout).rows[0].texts["part_number"] == "A"
     for row in agree:
-        assert len(read_csv(f"A title\n{header}\n{row}\n".encode(), 20)) == 1
+        assert len(read_bom(f"A title\n{header}\n{row}\n".encode(), 20).rows) == 1
 
 
 def test_a_turnstile_lets_in_so_many_and_no_more() -> None:

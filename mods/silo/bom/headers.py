@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from typing import Any
 
@@ -189,26 +189,6 @@ def alias(text: str) -> tuple[Heading, int] | None:
     "Component").
     """
     return _ROLE_OF.get(text)
-
-
-def find_roles(header: Sequence[str], roles: Collection[Heading]) -> dict[Heading, int]:
-    """Find the column index of each role. If two columns fit, the better name wins, then the first."""
-    best: dict[Heading, tuple[int, int]] = {}
-    for index, cell in enumerate(header):
-        role_of_cell = alias(normal(cell))
-        if role_of_cell is not None and role_of_cell[0] in roles:
-            best[role_of_cell[0]] = min(
-                best.get(role_of_cell[0], (len(_ROLE_OF), 0)), (role_of_cell[1], index)
-            )
-    return {role: index for role, (_, index) in best.items()}
-
-
-def second_columns(
-    header: Sequence[str], roles: Collection[Heading], at: Mapping[Heading, int]
-) -> list[tuple[Heading, int]]:
-    """Return the columns that have the same role as a used column (``at``)."""
-    columns_by_role = ((alias(normal(cell)), index) for index, cell in enumerate(header))
-    return [(of[0], i) for of, i in columns_by_role if of and of[0] in roles and at.get(of[0], i) != i]
 
 
 def missing_columns(header: Sequence[str], at: Mapping[Heading, int], needed: Sequence[Heading]) -> str:

@@ -23,7 +23,9 @@ from silo.registering.candidate import Candidate, CandidateFiles, ComponentState
 from silo.registering.offer import Offer
 from silo.registering.request import AS_UTF_8, ITEM_TYPES, RegistrationRequest, find_item, wrong_name
 from silo.registering.saved_file import fingerprint
-from silo.workbook.encoding import unicode_name
+from silo.tables.kind import TableKind
+from silo.tables.sheet import read_sheet
+from silo.tables.yes_no import read_yes_no
 
 COLUMNS = (
     *("register", "file", "object", "standard", "name", "source", "supplier", "supplier_number"),
@@ -34,8 +36,6 @@ COLUMNS = (
 _SUPPLY = ("source", "supplier", "supplier_number")
 
 _AS_THEY_ARE = ("file", "object", "standard")
-
-_ANSWERS = {"yes": True, "y": True, "no": False, "n": False}
 
 SOURCES = {"": "", "made": "manufactured", "bought": "purchased"}
 
@@ -165,51 +165,49 @@ class TableRow:
         return self.cells["file"], self.cells["object"]
 
 
-def read_table(data: bytes, name: str) -> list[TableRow]:
+def _column(cell: str) -> tuple[str, int] | None:
+    name = cell.strip().lower()
+    return (name, 0) if name in COLUMNS else None
+
+
+# Names of files may be no UTF-8; any other text that is none is a problem of its row.
+PLAN = TableKind(
+    roles=COLUMNS,
+    naming=("register", "file", "standard"),
+    needed=tuple(column for column in COLUMNS if column not in _SUPPLY),
+    single=COLUMNS,
+    role_of=_column,
+    code_pages=(),
+)
+"""The table of ``--plan``."""
+
+
+@dataclass(frozen=True)
+class TableRows:
+    """The rows of a table, and the titles of the columns that are not used."""
+
+    rows: tuple[TableRow, ...]
+    unused: tuple[str, ...]
+
+
+def read_table(data: bytes, name: str) -> TableRows:
     """Read the rows of a table, as a spreadsheet or an editor saved it. InputError lists all that is
     wrong.
     """
-    text = _decoded(data, name)
-    first = text.split("\n", 1)[0]
-    delimiter = max(",;\t", key=first.count)
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
-    begins, problems, rows = 1, [], []
-    header: list[str] | None = None
-    try:
-        for cells in reader:
-            line, begins = begins, reader.line_num + 1
-            if not any(cell.strip() for cell in cells):
-                continue
-            if header is None:
-                header = [cell.strip().lower() for cell in cells]
-                continue
-            while len(cells) > len(header) and not cells[-1].strip():
-                cells.pop()  # what a spreadsheet leaves behind on the right
-            if len(cells) != len(header):
-                problems.append(f"line {line}: wanted {len(header)} cells as in the header, got {len(cells)}")
-                continue
-            # The name of a file may begin with a space; a text that the user writes does not.
-            row = dict.fromkeys(_SUPPLY, "")
-            row |= {c: _as_written(t) for c, t in zip(header, cells, strict=True)}
-            rows.append(TableRow(line, {c: t if c in _AS_THEY_ARE else t.strip() for c, t in row.items()}))
-    except csv.Error as error:
-        raise InputError(f"{name}: the row of line {begins} cannot be read as CSV: {error}") from None
-    lacking = [column for column in COLUMNS if column not in (*(header or ()), *_SUPPLY)]
-    if lacking:
-        raise InputError(f"{name} is not a table of --plan: it has no column {', '.join(lacking)}")
-    twice = sorted(column for column, count in Counter(header).items() if count > 1 and column)
-    problems[:0] = [f"line 1: the column {column} is there more than once" for column in twice]
+    sheet = read_sheet(data, name, PLAN)
+    twice = sorted({role for role, _ in sheet.columns.others})
+    problems = [f"line {sheet.header_line}: the column {column} is there more than once" for column in twice]
     if problems:
         raise InputError(f"{name} cannot be read; nothing was registered", problems)
-    return rows
-
-
-def _decoded(data: bytes, name: str) -> str:
-    encoding = unicode_name(data) or "utf-8"
-    if b"\0" in data and encoding == "utf-8":
-        raise InputError(f"{name} is not a CSV file; save the table as CSV (UTF-8)")
-    # Names of files may be no UTF-8; any other text that is none is a problem of its row.
-    return data.decode(encoding, "replace" if "16" in encoding else "surrogateescape")
+    rows = []
+    for row in sheet.rows:
+        cells = dict.fromkeys(COLUMNS, "")
+        for column, index in sheet.columns.at.items():
+            text = _as_written(row.cells[index] if index < len(row.cells) else "")
+            # The name of a file may begin with a space; a text that the user writes does not.
+            cells[column] = text if column in _AS_THEY_ARE else text.strip()
+        rows.append(TableRow(row.line, cells))
+    return TableRows(tuple(rows), tuple(sheet.unused))
 
 
 @dataclass(frozen=True)
@@ -242,7 +240,7 @@ def requests_of(rows: Sequence[TableRow], offer: Offer, base: str, api: Any, nam
     done = 0
     for row in rows:
         row_problems: list[str] = []
-        wanted = _ANSWERS.get(row.cells["register"].lower())
+        wanted = read_yes_no(row.cells["register"])
         if wanted is None:
             row_problems.append(f"register: wanted yes or no, got {row.cells['register']!r}")
         if counts[row.key] > 1:

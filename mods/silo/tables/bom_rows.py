@@ -192,7 +192,7 @@ def count_designators(cell: str) -> int:
     )
 
 
-def structure_of(sheet: Sheet, rows: Sequence[SheetRow], at: Mapping[str, int]) -> structure.Structure:
+def structure_of(sheet: Sheet, rows: Sequence[SheetRow], at: Mapping[str, int]) -> structure.RowTree:
     """Find which row stands below which."""
 
     def column(role: str) -> list[str]:
@@ -206,7 +206,7 @@ def structure_of(sheet: Sheet, rows: Sequence[SheetRow], at: Mapping[str, int]) 
     named = next((at[role] for role in NAMING if role in at), None)
     raw = [row.cells[named] if named is not None and named < len(row.cells) else "" for row in rows]
     levels = structure.indent_levels(raw)
-    return structure.flat(len(rows)) if levels is None else structure.Structure(
+    return structure.flat(len(rows)) if levels is None else structure.RowTree(
         structure.by_levels(levels).parents, "indent"
     )  # fmt: skip
 

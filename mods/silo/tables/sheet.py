@@ -38,8 +38,8 @@ class Sheet:
         the heading, both lines of it joined, and the line of the file on which it begins.
     notes
         what had to be assumed to read it.
-    hidden, struck, other_sheets
-        lines of the workbook that are hidden or struck out; names of its other sheets with such a table.
+    hidden, struck, sheets
+        lines of the workbook that are hidden or struck out; names of its sheets with such a table.
     """
 
     header: tuple[str, ...]
@@ -50,7 +50,7 @@ class Sheet:
     notes: tuple[str, ...] = ()
     hidden: tuple[int, ...] = ()
     struck: tuple[int, ...] = ()
-    other_sheets: tuple[str, ...] = ()
+    sheets: tuple[str, ...] = ()
 
     @property
     def unused(self) -> list[str]:
@@ -166,12 +166,12 @@ def _from_workbook(
         lines = [", ".join(row.cells) for _, rows in sheets for row in rows]
         raise InputError(f"{source}: {near or _no_header(lines, kind)}")
     notes = []
-    others = tuple(grid.name for grid, _, _ in usable[1:])
-    if others:
-        names = ", ".join(f"sheet “{name}”" for name in others)
-        notes = [f"sheet “{usable[0][0].name}” of the workbook was read; not read: {names}"]
+    sheets_read = tuple(grid.name for grid, _, _ in usable) if usable[1:] else ()
+    if sheets_read:
+        others = ", ".join(f"sheet “{name}”" for name in sheets_read[1:])
+        notes = [f"sheet “{usable[0][0].name}” of the workbook was read; not read: {others}"]
     grid, rows, best = usable[0]
-    return _sheet(rows, best, kind, columns, notes, source, continues, grid, others)
+    return _sheet(rows, best, kind, columns, notes, source, continues, grid, sheets_read)
 
 
 def _chosen(records: Sequence[SheetRow], kind: TableKind, layout: Layout, source: str) -> _Header:
@@ -197,7 +197,7 @@ def _sheet(
     source: str,
     continues: Continues | None,
     grid: Grid | None = None,
-    others: tuple[str, ...] = (),
+    named: tuple[str, ...] = (),
 ) -> Sheet:
     header, columns, first = best.header, best.columns, best.index + best.lines
     below = records[first] if first < len(records) else None
@@ -231,7 +231,7 @@ def _sheet(
     if grid is None:
         _refuse_long(rows, len(header.cells), source)
     return Sheet(
-        header.cells, header.line, columns, rows, best.delimiter, tuple(notes), hidden, struck, others
+        header.cells, header.line, columns, rows, best.delimiter, tuple(notes), hidden, struck, named
     )
 
 
@@ -322,9 +322,12 @@ def _near(tables: Iterable[tuple[str, Sequence[SheetRow]]], kind: TableKind) -> 
         for row in rows:
             at = find_columns(row.cells, kind).at
             if len(row.cells) > 1 and {*kind.needed} & at.keys():
-                lacking = [Heading(role) for role in kind.lacking(at)]
+                lacking = kind.lacking(at)
+                if not {*lacking} <= {*Heading}:
+                    return f"in line {row.line}, there is no column {', '.join(lacking)}"
                 known = {Heading(role): place for role, place in at.items()}
-                return f"in line {row.line}, {missing_columns(row.cells, known, lacking)}"
+                missing = missing_columns(row.cells, known, [Heading(role) for role in lacking])
+                return f"in line {row.line}, {missing}"
     return ""
 
 
@@ -342,6 +345,17 @@ def _no_header(text: Sequence[str], kind: TableKind) -> str:
     if kind.any_name:
         words += ". Name the columns yourself, for example: --column name=Bauteil --column mass=Gewicht"
     return words
+
+
+def guess_layout(data: bytes, source: str, kind: TableKind) -> Layout | None:
+    """Find how a file is read if the user says nothing; None if it has no heading that we know."""
+    if data.startswith(STARTS):
+        tables = [[("", grid.rows()[: limits.HEADER_WITHIN])] for grid in read_workbook(data, source)]
+    else:
+        texts = decodings(data, None, source, kind.code_pages)
+        tables = [[(mark, first_records(text, mark)) for mark in DELIMITERS] for _, text in texts]
+    best = next((found for table in tables if (found := _best_header(table, kind, None))), None)
+    return None if best is None else Layout(best.delimiter, best.index, dict(best.columns.at))
 
 
 def first_lines(

@@ -20,7 +20,7 @@ _DOTS = re.compile(r"([.+>·|\-])\1{0,60}")
 
 
 @dataclass(frozen=True, slots=True)
-class Structure:
+class RowTree:
     """The tree of a table's rows.
 
     parents
@@ -67,7 +67,7 @@ def level(text: str) -> int | None:
     return len(bare) if _DOTS.fullmatch(bare) else None
 
 
-def by_positions(positions: Sequence[str]) -> Structure:
+def by_positions(positions: Sequence[str]) -> RowTree:
     """Find the tree of rows with position numbers (:func:`position`)."""
     seen: dict[str, int] = {}
     parents: list[int | None] = []
@@ -84,10 +84,10 @@ def by_positions(positions: Sequence[str]) -> Structure:
             problems[index] = "the row has no position number that can be read"
         if text:
             seen[text] = index
-    return Structure(tuple(parents), "position", problems)
+    return RowTree(tuple(parents), "position", problems)
 
 
-def by_levels(levels: Sequence[int | None]) -> Structure:
+def by_levels(levels: Sequence[int | None]) -> RowTree:
     """Find the tree of rows with levels, which may start at 0 or 1."""
     known = [value for value in levels if value is not None]
     top = min(known, default=1)
@@ -105,7 +105,7 @@ def by_levels(levels: Sequence[int | None]) -> Structure:
             problems.setdefault(index, f"the level {here} follows on {above if stack else 'no row'}")
         parents.append(stack[-1][1] if stack else None)
         stack.append((here, index))
-    return Structure(tuple(parents), "level", problems)
+    return RowTree(tuple(parents), "level", problems)
 
 
 def indent_levels(cells: Sequence[str]) -> list[int] | None:
@@ -128,6 +128,6 @@ def _indent(cell: str) -> int:
     return len(text) - len(text.lstrip())
 
 
-def flat(count: int) -> Structure:
+def flat(count: int) -> RowTree:
     """Return the structure of a table of one level."""
-    return Structure((None,) * count)
+    return RowTree((None,) * count)

@@ -16,6 +16,8 @@ from starlette.responses import Response
 from silo.bom.errors import RejectedError
 from silo.bom.numbers import LONGEST, read_number
 from silo.bom.quantities import as_decimal
+from silo.tables.price_rows import PriceRows
+from silo.tables.sheet import Layout
 from silo_server.db.transaction import Tx
 from silo_server.fields import to_wire
 from silo_server.routes import openapi
@@ -26,7 +28,6 @@ from silo_server.routes.made_files import CSV, XLSX, content_of, file_of
 from silo_server.routes.models import Brief, RequestBody, Short, Text
 from silo_server.routes.requests import BoundedRoute, ExpectedVersion
 from silo_server.services import orders, suppliers
-from silo_server.services.bom.import_table import Layout, Record, as_csv, guess_of, read_csv
 from silo_server.services.items import get_item
 from silo_server.services.orders import NewOrder, OrderRequest, OrderRow, Recorded
 from silo_server.services.product.export import Export
@@ -153,9 +154,9 @@ async def import_suppliers(call: Editor, dry_run: Annotated[bool, Query()] = Fal
     data, _ = await uploaded(call.request)
 
     def work() -> Response:
-        records, layout = records_of(call, as_csv(data, suppliers.TABLE))
+        read = prices_of(call, data)
         with call.read() if dry_run else call.write() as tx:
-            plan = (suppliers.plan_suppliers if dry_run else suppliers.apply_suppliers)(tx, records, layout)
+            plan = (suppliers.plan_suppliers if dry_run else suppliers.apply_suppliers)(tx, read)
             rows = [
                 {
                     "part_number": item.part_number,
@@ -166,17 +167,22 @@ async def import_suppliers(call: Editor, dry_run: Annotated[bool, Query()] = Fal
                 }
                 for item in plan
             ]
-            return json_answer({"dry_run": dry_run, "items": rows})
+            return json_answer(
+                {
+                    "dry_run": dry_run,
+                    "unused_columns": list(read.unused),
+                    "notes": list(read.notes),
+                    "left_out": [{"row": row.line, "why": row.left_out} for row in read.rows if row.left_out],
+                    "items": rows,
+                }
+            )
 
     return await anyio.to_thread.run_sync(work)
 
 
-def records_of(call: Call, table: bytes, layout: Layout | None = None) -> tuple[list[Record], Layout]:
-    """Read a table of supplier parts; return its rows, and the layout that they were read with."""
-    records = read_csv(table, call.server.settings.max_merge_entries, layout, suppliers.TABLE)
-    read_as = layout or guess_of(table, suppliers.TABLE)
-    assert read_as is not None  # the rows were read with it
-    return records, read_as
+def prices_of(call: Call, table: bytes, layout: Layout | None = None) -> PriceRows:
+    """Read a table of supplier parts."""
+    return suppliers.read_prices(table, call.server.settings.max_merge_entries, layout)
 
 
 def asked_of(

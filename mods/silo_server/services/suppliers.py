@@ -22,11 +22,14 @@ from typing import Any, NamedTuple
 
 from sqlalchemy import func, insert, select, update
 
-from silo.bom.errors import ConflictError, RejectedError, VersionConflictError
+from silo.bom.errors import ConflictError, InputError, RejectedError, VersionConflictError
 from silo.bom.headers import Heading
-from silo.bom.numbers import Mark, common_mark, parse_number, read_number, whole_number, yes_or_no
+from silo.bom.numbers import Mark, parse_number, read_number, whole_number, yes_or_no
 from silo.bom.quantities import as_decimal, exact_product
 from silo.bom.text import character_problem
+from silo.tables.price_rows import PRICES, PriceRow, PriceRows, price_rows
+from silo.tables.sheet import Layout
+from silo.tables.yes_no import read_yes_no
 from silo_server.db.rows import one_of
 from silo_server.db.state import get_state, put_state
 from silo_server.db.tables import items, supplier_changes
@@ -34,7 +37,7 @@ from silo_server.db.transaction import Tx
 from silo_server.events import announce
 from silo_server.fields import from_row
 from silo_server.services import audit
-from silo_server.services.bom.import_table import Layout, Record, Table
+from silo_server.services.import_file import read_import
 from silo_server.services.items import get_by_numbers, get_item
 from silo_server.services.product.parts import DEFAULT_CURRENCY, RolledItem, currency_of, positive_number
 from silo_server.services.search import index_item
@@ -56,26 +59,10 @@ COLUMNS: Mapping[str, str] = {
 EXAMPLES = {"prices": "1: 0.50; 100: 0.40", "link": "https://…"}
 _RATES = "currency_rates"
 _CODE = re.compile("[A-Z]{3}")
-_CELLS = {"supplier_part_number": "number"}  # the column of a file → ours
 MOST_PARTS, MOST_PRICES = 50, 30
 _LONGEST = {"supplier": 200, "number": 200, "link": 2000}
 LARGEST_AMOUNT, LARGEST_PRICE = Decimal(10) ** 9, Decimal(10) ** 12
 LONGEST_LEAD_TIME = 3650
-# What an imported table has; several rows may have the prices of one supplier part.
-_ROLES = (
-    Heading.PART_NUMBER,
-    Heading.SUPPLIER,
-    Heading.SUPPLIER_NUMBER,
-    Heading.LINK,
-    Heading.PACK_SIZE,
-    Heading.MINIMUM,
-    Heading.PRICE,
-    Heading.FROM_QUANTITY,
-    Heading.CURRENCY,
-    Heading.LEAD_TIME,
-    Heading.PREFERRED,
-)
-TABLE = Table(_ROLES, (Heading.PART_NUMBER, Heading.SUPPLIER), {}, _ROLES)
 
 
 class SupplierPart(NamedTuple):
@@ -453,58 +440,71 @@ class ImportedItem:
     words: Sequence[str] = field(default=())
 
 
-def plan_suppliers(tx: Tx, records: Sequence[Record], layout: Layout) -> list[ImportedItem]:
+def read_prices(data: bytes, max_rows: int, layout: Layout | None = None) -> PriceRows:
+    """Read the rows of a price list. RejectedError if it is none, TooLargeError above ``max_rows``."""
+    sheet = read_import(data, PRICES, max_rows, layout)
+    try:
+        return price_rows(sheet, layout.mark if layout else None)
+    except InputError as error:
+        raise RejectedError(str(error), list(error.problems)) from None
+
+
+def plan_suppliers(tx: Tx, read: PriceRows) -> list[ImportedItem]:
     """Plan an import of rows, item by item; change nothing.
 
     A supplier part of the file replaces the same one of the item (by supplier and number), or is a new one;
     those that the file does not name stay. Several rows of one, each with a "from quantity", are its prices.
     """
-    records = [
-        (row, {_CELLS.get(name, name): text for name, text in entry.items()}) for row, entry in records
-    ]
-    numbers = ("prices", "pack_size", "minimum", "from")
-    texts = [record.get(name, "") for _, record in records for name in numbers]
-    shown = (number.mark for text in texts if (number := parse_number(text)))
-    # In a file separated by commas, a point is a decimal point.
-    dot = layout.mark is None and layout.delimiter == ","
-    reader = _Reader(layout.mark or common_mark(shown), dot, next(iter(rates_of(tx))))
-    items_by_number = get_by_numbers(
-        tx, [record["part_number"] for _, record in records if record.get("part_number")]
-    )
-    grouped: dict[str, list[Record]] = {}
-    for row, record in records:
-        grouped.setdefault(record.get("part_number", "").casefold(), []).append((row, record))
-    return [_planned(rows, items_by_number, reader) for rows in grouped.values()]
+    # Numbers come plain from the table: with a point.
+    reader = _Reader(Mark.POINT, True, next(iter(rates_of(tx))))
+    rows = [row for row in read.rows if not row.left_out]
+    numbers = [row.texts[Heading.PART_NUMBER] for row in rows if row.texts.get(Heading.PART_NUMBER)]
+    items_by_number = get_by_numbers(tx, numbers)
+    grouped: dict[str, list[PriceRow]] = {}
+    for row in rows:
+        grouped.setdefault(row.texts.get(Heading.PART_NUMBER, "").casefold(), []).append(row)
+    return [_planned(group, items_by_number, reader) for group in grouped.values()]
 
 
-def _planned(rows: Sequence[Record], items_by_number: Mapping[str, Item], reader: _Reader) -> ImportedItem:
-    number = rows[0][1].get("part_number", "")
+def _cells_of(row: PriceRow) -> dict[str, str]:
+    """Return the cells of a row by the names of our columns."""
+    cells = {"number": row.texts.get(Heading.SUPPLIER_NUMBER, "")}
+    cells |= {name: row.texts[name] for name in COLUMNS if name in row.texts}
+    cells["prices"] = "; ".join(f"{least:f}: {price:f}" for least, price in row.prices)
+    if said := cells.get("preferred"):
+        answer = read_yes_no(said)
+        cells["preferred"] = said if answer is None else "yes" if answer else ""
+    return cells
+
+
+def _planned(rows: Sequence[PriceRow], items_by_number: Mapping[str, Item], reader: _Reader) -> ImportedItem:
+    number = rows[0].texts.get(Heading.PART_NUMBER, "")
     item = items_by_number.get(number)
     problems: list[str] = []
     if item is None:
         what = f"{number!r} does not exist on this server, or is archived" if number else "is empty"
-        problems.append(f"row {rows[0][0]}: Part number: {what}")
+        problems.append(f"row {rows[0].line}: Part number: {what}")
+    problems += [f"row {row.line}: {problem}" for row in rows for problem in row.problems]
     named: dict[tuple[str, str], dict[str, str]] = {}
-    for row, record in rows:
-        key = record.get("supplier", "").casefold(), record.get("number", "").casefold()
-        prices = record.get("prices", "")
-        if record.get("from") and prices:
-            prices = f"{record['from']}: {prices}"
-        before = named.setdefault(key, {"row": str(row), "prices": ""})
-        for name, text in record.items():
-            first = before.setdefault(name, text) if name in COLUMNS and name != "prices" and text else text
+    for row in rows:
+        cells = _cells_of(row)
+        key = cells.get("supplier", "").casefold(), cells["number"].casefold()
+        before = named.setdefault(key, {"row": str(row.line), "prices": ""})
+        for name, text in cells.items():
+            first = before.setdefault(name, text) if name != "prices" and text else text
             if first != text:
                 problems.append(
-                    f"row {row}: {COLUMNS[name]} says {text[:40]!r}, row {before['row']} says {first[:40]!r}"
+                    f"row {row.line}: {COLUMNS[name]} says {text[:40]!r}, row {before['row']} says "
+                    f"{first[:40]!r}"
                 )
-        before["prices"] = "; ".join(filter(None, (before["prices"], prices)))
+        before["prices"] = "; ".join(filter(None, (before["prices"], cells["prices"])))
     there = {} if item is None else {part.key: part for part in supplier_parts_of(item)}
     was = list(there.values())
     if len(named) > MOST_PARTS:  # whatever the item has already
         sentence = (
-            f"row {rows[0][0]}: wanted at most {MOST_PARTS} supplier parts of an item, got {len(named)}"
+            f"row {rows[0].line}: wanted at most {MOST_PARTS} supplier parts of an item, got {len(named)}"
         )
-        return ImportedItem(number, [row for row, _ in rows], "error", [*problems, sentence])
+        return ImportedItem(number, [row.line for row in rows], "error", [*problems, sentence])
     for key, cells in named.items():
         kept = texts_of(there[key]) if key in there else {}
         given = {name: text for name, text in cells.items() if name in COLUMNS and text}
@@ -519,24 +519,24 @@ def _planned(rows: Sequence[Record], items_by_number: Mapping[str, Item], reader
             there = {k: supplier_part._replace(preferred=False) for k, supplier_part in there.items()}
         there[key] = part
     parts = list(there.values())
-    problems += [f"row {rows[0][0]}: {problem}" for problem in list_problems(parts)] if not problems else []
+    problems += [f"row {rows[0].line}: {problem}" for problem in list_problems(parts)] if not problems else []
     status = "error" if problems else "same" if parts == was else "change"
     change = SupplierChange(
         0, "", "", *(dumps([to_json(supplier_part) for supplier_part in side]) for side in (was, parts))
     )
     words = change.words if status == "change" else ()
     return ImportedItem(
-        item.part_number if item else number, [row for row, _ in rows], status, problems, parts, words
+        item.part_number if item else number, [row.line for row in rows], status, problems, parts, words
     )
 
 
-def apply_suppliers(tx: Tx, records: Sequence[Record], layout: Layout) -> list[ImportedItem]:
+def apply_suppliers(tx: Tx, read: PriceRows) -> list[ImportedItem]:
     """Import rows, all or nothing. RejectedError lists every problem; then nothing was changed."""
     # Two imports of one item come one after the other, each on what the other wrote.
-    keys = {record.get("part_number", "").casefold() for _, record in records}
+    keys = {row.texts.get(Heading.PART_NUMBER, "").casefold() for row in read.rows}
     query = select(items.c.id).where(one_of(tx, items.c.part_number_key, keys)).order_by(items.c.id)
     tx.conn.execute(query.with_for_update(key_share=True))
-    plan = plan_suppliers(tx, records, layout)
+    plan = plan_suppliers(tx, read)
     problems = [problem for item in plan for problem in item.problems]
     if problems:
         raise RejectedError(

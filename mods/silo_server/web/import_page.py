@@ -21,24 +21,15 @@ from starlette.responses import Response
 from silo.bom.errors import RejectedError, SiloError, VersionConflictError
 from silo.bom.headers import Heading
 from silo.bom.numbers import Mark
+from silo.tables.bom_rows import BOM, BomRows
+from silo.tables.kind import TableKind
+from silo.tables.limits import HEADER_WITHIN, MOST_COLUMNS
+from silo.tables.sheet import Layout, first_lines, guess_layout
 from silo_server.errors import TooLargeError
 from silo_server.routes.call import Call
 from silo_server.schema import find_schema
 from silo_server.services.bom import imports
-from silo_server.services.bom.import_table import (
-    BOM,
-    DELIMITERS,
-    HEADER_WITHIN,
-    MAX_COLUMNS,
-    Layout,
-    Table,
-    as_csv,
-    first_lines,
-    guess_of,
-    likely_delimiter,
-    read_csv,
-)
-from silo_server.services.bom.imports import NOTHING, Allowed
+from silo_server.services.bom.import_plan import NOTHING, Allowed
 from silo_server.services.file_store import clean_name
 from silo_server.services.items import get_item
 from silo_server.web.accounts import Writer
@@ -49,13 +40,14 @@ from silo_server.web.render import N_, _, isolate, page, plural
 
 router = APIRouter(include_in_schema=False)
 
+DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
 MOST_BYTES = 8 * 1024 * 1024
 MOST_ROWS = 1000
 
 
 @dataclass(frozen=True)
 class Upload:
-    """A table as CSV, and the name of its file."""
+    """A table as it was chosen, and the name of its file."""
 
     name: str
     data: bytes
@@ -83,12 +75,12 @@ def check(call: Writer, part_number: str, form: Form) -> Response:
 
 
 def checked(
-    form: FormData, of: Table, show: Callable[[Upload | None, Layout | None, Problem], Response]
+    form: FormData, of: TableKind, show: Callable[[Upload | None, Layout | None, Problem], Response]
 ) -> Response:
     """Show what a file would do, or why it cannot be read."""
     upload, layout = None, None
     try:
-        upload = carried(form) if "packed" in form else uploaded(form, of)
+        upload = carried(form) if "packed" in form else uploaded(form)
         layout = layout_of(form, of)
         return show(upload, layout, Problem())
     except (RejectedError, TooLargeError) as error:
@@ -98,11 +90,11 @@ def checked(
 @router.post("/items/{part_number}/import")
 def apply(call: Writer, part_number: str, form: Form) -> Response:
     """Import the file; if the BOM has changed since the check, check it again instead."""
-    upload, layout, allowed = carried(form), layout_of(form), _allowed(form)
+    upload, layout, allowed = carried(form), layout_of(form, BOM), _allowed(form)
     try:
-        records = read_csv(upload.data, call.server.settings.max_merge_entries, layout)
+        records = imports.read_bom(upload.data, call.server.settings.max_merge_entries, layout)
         with call.write() as tx:
-            plan, change, _item = imports.apply_import(
+            plan, changes_made, _version = imports.apply_import(
                 tx, part_number, records, upload.name, whole(form, "version"), allowed
             )
     except VersionConflictError:
@@ -121,11 +113,14 @@ def apply(call: Writer, part_number: str, form: Form) -> Response:
         changed=plan.count("change"),
         parts=plural(len(plan.new), "part"),
     )
-    return back(bom_path(part_number), notice, undo=[change])
+    return back(bom_path(part_number), notice, undo=changes_made)
 
 
 def _allowed(form: FormData) -> Allowed:
-    return Allowed(text(form, "category", 32), bool(text(form, "add_up")))
+    return Allowed(
+        text(form, "category", 32),
+        *(bool(text(form, name)) for name in ("add_up", "quantities", "remove")),
+    )
 
 
 @dataclass(frozen=True)
@@ -142,7 +137,7 @@ class Problem:
         return cls(str(error), error.status_hint)
 
 
-def layout_of(form: FormData, of: Table = BOM) -> Layout | None:
+def layout_of(form: FormData, of: TableKind = BOM) -> Layout | None:
     """Read how the person wants the file to be read; None if that was not chosen."""
     if "header" not in form:
         return None
@@ -152,7 +147,7 @@ def layout_of(form: FormData, of: Table = BOM) -> Layout | None:
     return Layout(
         delimiter if isinstance(delimiter, str) and delimiter in DELIMITERS else ",",
         min(whole(form, "header") or 0, HEADER_WITHIN - 1),
-        {role: at for role, at in columns.items() if at is not None and at < MAX_COLUMNS},
+        {role: at for role, at in columns.items() if at is not None and at < MOST_COLUMNS},
         marks.get(text(form, "mark")),
     )
 
@@ -165,7 +160,11 @@ def _show(
     problem: Problem = Problem(),
     allowed: Allowed = NOTHING,
 ) -> Response:
-    records = read_csv(upload.data, call.server.settings.max_merge_entries, layout) if upload else ()
+    records = (
+        imports.read_bom(upload.data, call.server.settings.max_merge_entries, layout)
+        if upload
+        else BomRows(())
+    )
     with call.read() as tx:
         item = get_item(tx, part_number)
         plan = imports.plan_import(tx, part_number, records, allowed) if upload else None
@@ -191,20 +190,26 @@ def _show(
     )
 
 
-_LABELS = {
+ROLE_WORDS: dict[str, str] = {
     Heading.TYPE: N_("Type"),
     Heading.REVISION: N_("Revision"),
     Heading.SUPPLIER_NUMBER: N_("Supplier’s part number"),
     Heading.PRICE: N_("Price"),
+    Heading.PRICE_BASIS: N_("Price is for … pieces"),
+    Heading.NOT_FITTED: N_("Not fitted (DNP)"),
+    Heading.FITTED: N_("Fitted (Populate)"),
+    Heading.ITEM: N_("Position"),
     Heading.FROM_QUANTITY: N_("Price from quantity"),
     Heading.LEAD_TIME: N_("Lead time [days]"),
 }
 
 
-def reading(file: Upload, layout: Layout | None, of: Table = BOM) -> dict[str, Any]:
+def reading(file: Upload, layout: Layout | None, of: TableKind = BOM) -> dict[str, Any]:
     """Describe how the file is read, for the form in which a person changes that."""
-    layout_read = layout or guess_of(file.data, of) or Layout(likely_delimiter(file.data), 0)
-    lines = first_lines(file.data, layout_read.delimiter, layout_read.header + 6)
+    guessed = layout or guess_layout(file.data, "file", of)
+    delimiter, lines = first_lines(file.data, "file", of, guessed.delimiter if guessed else None)
+    layout_read = guessed or Layout(delimiter, 0)
+    lines = lines[: layout_read.header + 6]
     header = lines[layout_read.header] if layout_read.header < len(lines) else []
     width = max(map(len, lines), default=0)
     samples = lines[layout_read.header + 1 :]
@@ -212,8 +217,8 @@ def reading(file: Upload, layout: Layout | None, of: Table = BOM) -> dict[str, A
         "layout": layout_read,
         "chosen": layout is not None,
         "lines": [" | ".join(cells)[:60] for cells in lines],
-        "delimiters": DELIMITERS,
-        "roles": [(role, _(_LABELS.get(role, role.replace("_", " ").capitalize()))) for role in of.roles],
+        "delimiters": DELIMITERS if delimiter else {},
+        "roles": [(role, _(ROLE_WORDS.get(role, role.replace("_", " ").capitalize()))) for role in of.roles],
         "needed": of.needed,
         "columns": [_name_of(index, header, samples) for index in range(width)],
     }
@@ -227,13 +232,11 @@ def _name_of(index: int, header: Sequence[str], samples: Sequence[Sequence[str]]
     )
 
 
-def uploaded(form: FormData, of: Table) -> Upload:
+def uploaded(form: FormData) -> Upload:
     file = form.get("file")
     if not isinstance(file, UploadFile) or not file.filename:
         raise RejectedError(_("No file was chosen."))
     data = file.file.read(MOST_BYTES + 1)
-    if len(data) <= MOST_BYTES:
-        data = as_csv(data, of)
     if len(data) > MOST_BYTES:
         raise TooLargeError(
             _("The file is larger than %(size)s MiB; this cannot be a BOM.", size=MOST_BYTES // 2**20)

@@ -15,14 +15,15 @@ from starlette.datastructures import FormData
 from starlette.responses import Response
 
 from silo.bom.errors import RejectedError, SiloError, VersionConflictError
+from silo.tables.price_rows import PRICES, PriceRows
+from silo.tables.sheet import Layout
 from silo_server.routes.call import Call
-from silo_server.routes.orders import OrderedBody, asked_of, record_all, records_of
+from silo_server.routes.orders import OrderedBody, asked_of, prices_of, record_all
 from silo_server.services import items as item_service
 from silo_server.services import orders, releases, suppliers
-from silo_server.services.bom.import_table import Layout
 from silo_server.services.items import ItemChange, get_item
 from silo_server.services.orders import OrderRequest, OrderRow
-from silo_server.services.suppliers import COLUMNS, EXAMPLES, MOST_PARTS, TABLE, decimal_text, typed_text
+from silo_server.services.suppliers import COLUMNS, EXAMPLES, MOST_PARTS, decimal_text, typed_text
 from silo_server.web.accounts import Administrator, Reader, Writer
 from silo_server.web.forms import Form, amount, back, back_to, problems_of, text, texts, whole
 from silo_server.web.import_page import Problem, Upload, carried, checked, layout_of, reading
@@ -233,11 +234,11 @@ def _prices(
 ) -> Response:
     file = upload or problem.upload
     layout_read = layout or problem.layout
-    plan = None
+    plan, read = None, PriceRows(())
     if upload:
-        records, read_as = records_of(call, upload.data, layout)
+        read = prices_of(call, upload.data, layout)
         with call.read() as tx:
-            plan = suppliers.plan_suppliers(tx, records, read_as)
+            plan = suppliers.plan_suppliers(tx, read)
         order = {"error": 0, "change": 1, "same": 2}
         plan.sort(key=lambda item: order[item.status])
     with call.read() as tx:
@@ -248,11 +249,14 @@ def _prices(
         status=problem.status,
         upload=upload,
         plan=plan,
+        unused=read.unused if upload else (),
+        notes=read.notes if upload else (),
+        left_out=[row for row in read.rows if row.left_out] if upload else (),
         wrong=sum(item.status == "error" for item in plan or ()),
         changed=sum(item.status == "change" for item in plan or ()),
         problem=problem.words,
         file=file,
-        reading=reading(file, layout_read, TABLE) if file else None,
+        reading=reading(file, layout_read, PRICES) if file else None,
         action="/suppliers/check",
         own=own[0],
         rates=typed if typed is not None else [(code, typed_text(rate)) for code, rate in rates],
@@ -262,17 +266,17 @@ def _prices(
 @router.post("/suppliers/check")
 def check(call: Writer, form: Form) -> Response:
     """Show what a table would change; write nothing."""
-    return checked(form, TABLE, partial(_prices, call))
+    return checked(form, PRICES, partial(_prices, call))
 
 
 @router.post("/suppliers/import")
 def apply(call: Writer, form: Form) -> Response:
     """Import a table that was checked."""
-    upload, layout = carried(form), layout_of(form, TABLE)
+    upload, layout = carried(form), layout_of(form, PRICES)
     try:
-        records, read_as = records_of(call, upload.data, layout)
+        read = prices_of(call, upload.data, layout)
         with call.write() as tx:
-            plan = suppliers.apply_suppliers(tx, records, read_as)
+            plan = suppliers.apply_suppliers(tx, read)
     except SiloError as error:
         return _prices(call, upload, layout, Problem.of(error))
     changed = sum(item.status == "change" for item in plan)

@@ -29,7 +29,7 @@ from silo.output_files import NEW
 from silo.registering.closed_files import seen_on_disk, whole_folder
 from silo.registering.journal import Journal
 from silo.registering.offer import Offer, offer
-from silo.registering.table import read_table
+from silo.registering.table import TableRow, read_table
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
@@ -119,7 +119,15 @@ def run_register(args: argparse.Namespace) -> int:
         return undeclare(args)
     if args.declare:
         return declare(args)
-    rows = read_table(Path(args.apply).read_bytes(), args.apply) if args.apply else []
+    rows: tuple[TableRow, ...] = ()
+    if args.apply:
+        table = read_table(Path(args.apply).read_bytes(), args.apply)
+        rows = table.rows
+        if table.unused:
+            from silo.cli.terminal import plain
+
+            words = f"{args.apply}: these columns are not used: {', '.join(table.unused)}"
+            print(f"silo-mod: {plain(words)}", file=sys.stderr)
     extraction, unused, unread = _read(args)
     base = os.path.realpath(args.top) if os.path.isdir(args.top) else base_folder(extraction)
     with client_of(args) as client:

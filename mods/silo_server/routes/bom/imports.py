@@ -22,7 +22,7 @@ from silo_server.routes.made_files import XLSX
 from silo_server.routes.requests import FORM_TYPES, ExpectedVersion, idempotency_key
 from silo_server.services.bom import imports
 from silo_server.services.bom.change import locked_parent
-from silo_server.services.bom.import_table import as_csv, read_csv
+from silo_server.services.bom.import_plan import Allowed, ImportPlan
 from silo_server.services.file_store import clean_name
 from silo_server.user_json import dumps
 
@@ -58,18 +58,22 @@ async def import_csv(
     dry_run: Annotated[bool, Query()] = False,
     make: Annotated[str, Query(max_length=32)] = "",
     add_up: Annotated[bool, Query()] = False,
+    quantities: Annotated[bool, Query()] = False,
+    remove: Annotated[bool, Query()] = False,
 ) -> Response:
     """Import a CSV or a workbook: XLSX, ODS, XLS (as the body, or as the form part ``file``).
 
     ``dry_run`` says row by row what would happen. Without it everything is imported or, if a row is wrong,
     nothing (400 with all problems). ``make``: unknown parts are made in this category; ``add_up``: rows of
-    one part are added up. A repeat with the same ``Idempotency-Key`` gets the first answer.
+    one part are added up; ``quantities``: the quantity counts where the designators name another number;
+    ``remove``: lines that the file does not have are removed. A file with levels changes the BOMs of its
+    sub-assemblies too. A repeat with the same ``Idempotency-Key`` gets the first answer.
     """
     data, name = await uploaded(call.request)
-    allowed = imports.Allowed(make, add_up)
+    allowed = Allowed(make, add_up, quantities, remove)
 
     def work() -> Response:
-        records = read_csv(as_csv(data), call.server.settings.max_merge_entries)
+        records = imports.read_bom(data, call.server.settings.max_merge_entries)
         if dry_run:
             with call.read() as tx:
                 return json_answer(
@@ -83,7 +87,7 @@ async def import_csv(
                 idempotency_key(call.request),
                 digest,
                 name,
-                *filter(None, (make, add_up)),
+                *filter(None, (make, add_up, quantities and "quantities", remove and "remove")),
             )
             answer = earlier_answer(tx, request)
             if answer is None:
@@ -95,12 +99,19 @@ async def import_csv(
     return await anyio.to_thread.run_sync(work)
 
 
-def plan_to_wire(plan: imports.ImportPlan, dry_run: bool) -> dict[str, Any]:
+def plan_to_wire(plan: ImportPlan, dry_run: bool) -> dict[str, Any]:
     """Return the plan of an import as the API sends it."""
     return {
         "dry_run": dry_run,
         "counts": {status: plan.count(status) for status in ("add", "change", "same", "skip", "error")},
         "problems": plan.problems,
+        "unused_columns": list(plan.unused),
+        "notes": list(plan.notes),
+        "missing": [
+            {"parent": each.parent, "part_number": each.line.child_part_number, "id": each.line.id}
+            for each in plan.missing
+        ],
+        "removed": plan.removed,
         "rows": [
             {
                 "row": row.row,
@@ -108,6 +119,9 @@ def plan_to_wire(plan: imports.ImportPlan, dry_run: bool) -> dict[str, Any]:
                 "status": row.status,
                 **({"name": row.name} if row.name else {}),
                 **({"new": True} if row.new else {}),
+                **({"why": row.why} if row.why else {}),
+                "parent": row.parent,
+                "depth": row.depth,
                 "problems": list(row.problems),
                 "before": state_to_wire(row.before),
                 "after": state_to_wire(row.after),

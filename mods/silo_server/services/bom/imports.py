@@ -1,28 +1,29 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """The import of a table into a BOM: first what would happen, row by row; then, if nothing is wrong, all.
 
-Rows add manual lines or change lines that are there (by the rules of a user's edit); lines that the file
-does not name stay as they are. Our own single-level export, imported again, changes nothing. A row without a
-part number, as KiCad writes them, means the part of its manufacturer's number, else of its name: the value
-and the footprint. Unknown parts are made on the way, and rows of one part added up, if the user allows that.
+Rows add manual lines or change lines that are there (by the rules of a user's edit). A file with levels
+changes the BOMs of its sub-assemblies too, in one transaction; an assembly that stands in it several times
+must have the same rows each time. Lines that the file does not name stay as they are, unless the user
+removes them. Our own exports, imported again, change nothing. Unknown parts are made on the way, and rows
+of one part added up, if the user allows that.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from typing import Any
 
 from sqlalchemy import select
 
 from silo.api.wire import LineTexts
-from silo.bom.errors import RejectedError, listed
-from silo.bom.headers import (
-    designators,
-)
+from silo.bom.errors import InputError, RejectedError
+from silo.bom.headers import Heading, designators
 from silo.bom.numbers import whole_number
 from silo.bom.quantities import exact_sum
+from silo.tables.bom_rows import BOM, BomRow, BomRows, bom_rows
+from silo.tables.sheet import Layout
 from silo_server.db.rows import one_of
 from silo_server.db.tables import items
 from silo_server.db.transaction import Tx
@@ -32,342 +33,409 @@ from silo_server.services.bom.change import (
     ChangeNote,
     LineRecord,
     apply_changes,
+    check_version,
+    locked_parent,
     new_line_id,
-    parent_to_change,
 )
 from silo_server.services.bom.cycles import check_no_cycle, find_rings
-from silo_server.services.bom.import_table import BOUGHT, Record
+from silo_server.services.bom.import_parts import PartRow, identified, new_item
+from silo_server.services.bom.import_plan import NOTHING, Allowed, ImportPlan, ImportRow, MissingLine
 from silo_server.services.bom.line_edit import check_state, edited_state
-from silo_server.services.bom.lines import lines_of
-from silo_server.services.items import (
-    ItemQuery,
-    NewItem,
-    check_number,
-    create_item,
-    get_item,
-    list_items,
-)
+from silo_server.services.bom.lines import lines_of_many
+from silo_server.services.import_file import read_import
+from silo_server.services.items import by_ids, create_item, get_item
 from silo_server.values import Item, Line, LineState
 
-"""The header must be among this many first lines (title blocks are a few lines long)."""
+_LEFT_OUT_ABOVE = "stands below a row that is left out"
 
 
-@dataclass(frozen=True, slots=True)
-class Allowed:
-    """What a person allows an import beside changing lines.
-
-    category
-        in which unknown parts are made; "": none is made.
-    add_up
-        rows of one part are added up.
-    """
-
-    category: str = ""
-    add_up: bool = False
+def read_bom(data: bytes, max_rows: int, layout: Layout | None = None) -> BomRows:
+    """Read the rows of a file. RejectedError if this is no BOM, TooLargeError above ``max_rows``."""
+    sheet = read_import(data, BOM, max_rows, layout)
+    try:
+        return bom_rows(sheet, layout.mark if layout else None)
+    except InputError as error:
+        raise RejectedError(str(error), list(error.problems)) from None
 
 
-NOTHING = Allowed()
+@dataclass
+class _File:
+    """The rows of a file and their assemblies; the parents and lines that Silo has of them."""
+
+    product: Item
+    parts: list[PartRow]
+    parents: list[int | None]
+    ids: Mapping[str, tuple[int, bool]]
+    assemblies: Mapping[str, Item] = field(default_factory=dict)
+    lines: Mapping[int, list[Line]] = field(default_factory=dict)
+
+    def assembly_key(self, index: int) -> str:
+        """Return the key of the part in whose BOM a row is."""
+        above = self.parents[index]
+        return self.product.part_number.casefold() if above is None else self.parts[above].key
+
+    def depth(self, index: int) -> int:
+        depth, above = 0, self.parents[index]
+        while above is not None:
+            depth, above = depth + 1, self.parents[above]
+        return depth
 
 
-@dataclass(frozen=True, slots=True)
-class ImportRow:
-    """What becomes of one row of the file. ``status``: add change same skip error.
-
-    name
-        what the file calls a part that has no number there.
-    new
-        the part that is made for it.
-    could
-        what a person may allow instead of a problem: ``make`` the part, ``add_up``.
-    """
-
-    row: int
-    part_number: str
-    status: str
-    problems: Sequence[str] = ()
-    before: LineState | None = None
-    after: LineState | None = None
-    child_id: int | None = None
-    line: Line | None = None
-    name: str = ""
-    new: NewItem | None = None
-    could: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class ImportPlan:
-    """What an import would do; ``problems`` are those of all rows."""
-
-    rows: Sequence[ImportRow]
-
-    @property
-    def problems(self) -> list[str]:
-        return [f"row {row.row}: {problem}" for row in self.rows for problem in row.problems]
-
-    @property
-    def new(self) -> list[NewItem]:
-        """Return the parts that the import makes, each once."""
-        return [row.new for row in self.rows if row.new]
-
-    def count(self, status: str) -> int:
-        """Count the rows with this status."""
-        return sum(row.status == status for row in self.rows)
-
-    def could(self, what: str) -> int:
-        """Count the rows whose problem a person may allow: ``make`` the part, or ``add_up``."""
-        return sum(row.could == what for row in self.rows)
-
-
-def plan_import(
-    tx: Tx, part_number: str, records: Sequence[Record], allowed: Allowed = NOTHING
-) -> ImportPlan:
-    """Plan an import of the rows of :func:`read_csv`, row by row; change nothing."""
-    parent = get_item(tx, part_number)
+def plan_import(tx: Tx, part_number: str, read: BomRows, allowed: Allowed = NOTHING) -> ImportPlan:
+    """Plan an import of the rows of :func:`read_bom`, row by row; change nothing."""
+    product = get_item(tx, part_number)
     if allowed.category:
         find_schema(None).category(allowed.category)
-    records = list(_identified(tx, records))
-    added: dict[int, int] = {}
-    if allowed.add_up:
-        records, added = _added_up(records)
-    lines = {(line.child_part_number.casefold(), line.state.rel_type): line for line in lines_of(tx, parent)}
-    keys = {record.get("part_number", "").casefold() for _, record in records}
+    file = _file_of(tx, product, read)
+    added = _add_up(file) if allowed.add_up else {}
+    rings = _rings(tx, file)
+    in_file = _file_rings(file)
+    rows: list[ImportRow] = []
+    seen: dict[tuple[int | None, str, str], int] = {}
+    first: dict[tuple[str, str, str], int] = {}
+    made: set[str] = set()
+    for index, part in enumerate(file.parts):
+        row = _plan_row(file, index, allowed, added, rows, made)
+        if row.status not in ("error", "skip"):
+            rel_type = row.after.rel_type if row.after else ""
+            own = (file.parents[index], part.key, rel_type)
+            anywhere = (file.assembly_key(index), part.key, rel_type)
+            if own in seen:
+                problem = f"{row.part_number or row.name} stands here twice"
+                row = replace(
+                    row, status="error", problems=(problem,), could="add_up", before=None, after=None
+                )
+            elif anywhere in first:
+                row = _again(row, rows[first[anywhere]])
+            seen.setdefault(own, index)
+            first.setdefault(anywhere, index)
+            ring = in_file.get(index) or rings.get((file.assembly_key(index), row.child_id or 0))
+            if ring and row.status in ("add", "error"):
+                row = replace(row, status="error", problems=(ring,), could="", before=None, after=None)
+        if row.new is not None:
+            made.add(part.key)
+        rows.append(row)
+    missing = _missing(file, rows)
+    return ImportPlan(rows, read.unused, read.notes, missing, allowed.remove)
+
+
+def _file_of(tx: Tx, product: Item, read: BomRows) -> _File:
+    parts = identified(tx, read.rows)
+    parents = [row.parent for row in read.rows]
+    tops = [index for index, above in enumerate(parents) if above is None and not read.rows[index].left_out]
+    root = tops[0] if len(tops) == 1 and any(above == tops[0] for above in parents) else None
+    if root is not None and parts[root].key == product.part_number.casefold():
+        # The file begins with the product itself: its lines are the rows below.
+        parts[root] = parts[root].with_row(
+            replace(read.rows[root], left_out="the product itself", problems=())
+        )
+        parents = [None if above == root else above for above in parents]
+    keys = {part.part_number.casefold() for part in parts} - {""}
     query = select(items.c.id, items.c.part_number_key, items.c.archived_at)
     ids = {
         row.part_number_key: (row.id, row.archived_at is not None)
         for row in tx.conn.execute(query.where(one_of(tx, items.c.part_number_key, keys)))
     }
-    new = {ids[key][0] for key in keys if key in ids}
-    rings = find_rings(tx, parent, new - {line.child_id for line in lines.values()})
-    rows: list[ImportRow] = []
-    seen: set[tuple[str, str]] = set()
-    for number, record in records:
-        if number in added:
-            number_of, name = record.get("part_number", ""), f"added to row {added[number]}"
-            rows.append(ImportRow(number, number_of, "skip", name=name))
-            continue
-        row = _plan_row(number, record, lines, ids, allowed.category)
-        key = (_key(record), row.after.rel_type if row.after else "")
-        if row.status not in ("error", "skip") and key in seen:
-            problem = f"{row.part_number or row.name} stands here twice"
-            row = ImportRow(number, row.part_number, "error", (problem,), name=row.name, could="add_up")
-        seen.add(key)
-        if row.status == "add" and row.child_id in rings:
-            row = ImportRow(number, row.part_number, "error", (_in_a_ring(parent, rings[row.child_id]),))
-        rows.append(row)
-    return ImportPlan(rows)
+    file = _File(product, parts, parents, ids)
+    above_keys = {file.assembly_key(index) for index in range(len(parts))}
+    known = by_ids(tx, [ids[key][0] for key in above_keys if key in ids])
+    file.assemblies = {item.part_number.casefold(): item for item in (*known.values(), product)}
+    file.lines = lines_of_many(tx, [item.id for item in file.assemblies.values()])
+    return file
 
 
-def _key(record: Mapping[str, str]) -> str:
-    """Return what all rows of one part have in common."""
-    return (record.get("part_number") or f"\n{record.get('unknown')}").casefold()
+def _plan_row(
+    file: _File,
+    index: int,
+    allowed: Allowed,
+    added: Mapping[int, int],
+    earlier: Sequence[ImportRow],
+    made: set[str],
+) -> ImportRow:
+    part, row, above = file.parts[index], file.parts[index].of, file.parents[index]
+    assembly = file.assemblies.get(file.assembly_key(index))
+    parent = assembly.part_number if assembly else ("" if above is None else file.parts[above].part_number)
+    base = ImportRow(
+        row.line,
+        part.part_number,
+        "skip",
+        name=part.unknown,
+        parent=parent,
+        depth=file.depth(index),
+        above=above,
+    )
+    if row.left_out:
+        return replace(base, why=row.left_out)
+    if index in added:
+        words = f"added to row {file.parts[added[index]].of.line}"
+        return replace(base, name=words, why=words)
+    if above is not None and earlier[above].why and file.parts[above].of.left_out != "the product itself":
+        return replace(base, why=_LEFT_OUT_ABOVE)
+    problems = list(row.problems)
+    changes = _changes(row, problems)
+    lines = {} if assembly is None else _by_part(file.lines.get(assembly.id, ()))
+    line = lines.get((part.part_number.casefold(), changes.get("rel_type", "component")))
+    child = file.ids.get(part.part_number.casefold()) if part.part_number else None
+    new, could = None, ""
+    if part.several:
+        problems.append(f"Part number: {part.several}")
+    elif not part.key:
+        problems.append("Part number: is empty")
+    elif child is None and part.key not in made and allowed.category:
+        new = new_item(part, allowed.category, problems)
+    elif child is None and part.key not in made:
+        problems.append(f"Part number: {part.part_number or part.unknown!r} does not exist on this server")
+        could = "make"
+    elif child is not None and child[1] and line is None:
+        problems.append(f"Part number: {part.part_number!r} is archived")
+    before = line.state if line else None
+    after = None
+    if not problems:
+        after = _after(before, changes)
+        try:
+            check_state(after)
+        except RejectedError as error:
+            problems.extend(error.problems)
+    if not problems and row.doubt and after != before and not allowed.quantities:
+        problems.append(f"{row.doubt}; correct one of them, or let the quantity count")
+        could = "quantities"
+    if problems:
+        return replace(
+            base, status="error", problems=tuple(problems), could=could if len(problems) == 1 else ""
+        )
+    status = "add" if before is None else "same" if after == before else "change"
+    child_id = child[0] if child else None
+    return replace(base, status=status, before=before, after=after, child_id=child_id, line=line, new=new)
 
 
-def _name_of(record: Mapping[str, str]) -> str:
-    """Find the name of a row's part: name, value with footprint (no KiCad library), or description."""
-    value = " ".join(filter(None, (record.get("value"), record.get("footprint", "").rpartition(":")[2])))
-    return record.get("name") or (value if record.get("value") else record.get("description", ""))
+def _after(before: LineState | None, changes: dict[str, Any]) -> LineState:
+    if before is None:
+        return LineState(**{"source": "manual", **changes})
+    return edited_state(
+        before, {name: value for name, value in changes.items() if not _as_written(before, name, value)}
+    )
 
 
-def _identified(tx: Tx, records: Iterable[Record]) -> Iterator[Record]:
-    """Yield the rows with the number of the part that each one means.
+def _by_part(lines: Iterable[Line]) -> dict[tuple[str, str], Line]:
+    return {(line.child_part_number.casefold(), line.state.rel_type): line for line in lines}
 
-    ``unknown`` names a part that is not here, ``several`` says that a name has several parts.
+
+def _again(row: ImportRow, before: ImportRow) -> ImportRow:
+    """Judge a row of an assembly that stands in the file once more: it must say the same."""
+    if row.after == before.after:
+        return replace(row, status="skip", why=f"the same as row {before.row}", new=None)
+    problem = (
+        f"{row.parent} has this part in row {before.row} too, with other values; an assembly has one BOM"
+    )
+    return replace(row, status="error", problems=(problem,), before=None, after=None, new=None)
+
+
+def _missing(file: _File, rows: Sequence[ImportRow]) -> list[MissingLine]:
+    """List the lines that the file does not have, of the product and of each assembly with rows in the
+    file.
     """
-    nameless = [record for _, record in records if not record.get("part_number")]
-    row, by_name, by_maker = items.c, dict[str, list[str]](), dict[str, list[str]]()
-    query = select(row.name, row.part_number).where(row.archived_at.is_(None)).order_by(row.part_number_key)
-    for name, number in tx.conn.execute(query.where(one_of(tx, row.name, {*map(_name_of, nameless)} - {""}))):
-        by_name.setdefault(name, []).append(number)
-    for maker in {record.get("manufacturer_part_number", "") for record in nameless} - {""}:
-        same_items, _ = list_items(tx, ItemQuery(search=maker, limit=100))
-        numbers = ((item.part_number, item.properties.get("manufacturer_part_number")) for item in same_items)
-        by_maker[maker] = [
-            part_number for part_number, own in numbers if str(own).casefold() == maker.casefold()
-        ]
-    for number, record in records:
-        maker, name = record.get("manufacturer_part_number", ""), _name_of(record)
-        record_fields = dict(record)
-        if not record.get("part_number") and (maker or name):
-            same = by_maker[maker] if maker else by_name.get(name, [])
-            if len(same) == 1:
-                record_fields["part_number"] = same[0]
-            elif same:
-                record_fields["several"] = (
-                    f"{maker or name}: {listed(same, 5)} are called so; give the part number"
-                )
-            else:
-                record_fields["unknown"] = maker or name
-        yield number, record_fields
+    named: dict[str, set[str]] = {file.product.part_number.casefold(): set()}
+    for index in range(len(rows)):
+        if file.parts[index].of.left_out != "the product itself":
+            named.setdefault(file.assembly_key(index), set()).add(file.parts[index].part_number.casefold())
+    missing = []
+    for key, children in named.items():
+        assembly = file.assemblies.get(key)
+        for line in file.lines.get(assembly.id, ()) if assembly else ():
+            if line.child_part_number.casefold() not in children:
+                missing.append(MissingLine(assembly.part_number if assembly else "", line))
+    return missing
+
+
+def _rings(tx: Tx, file: _File) -> dict[tuple[str, int], str]:
+    """Find the rows that would close a ring with what Silo has: (assembly, child) → why."""
+    wanted: dict[str, set[int]] = {}
+    for index, part in enumerate(file.parts):
+        if part.part_number.casefold() in file.ids:
+            wanted.setdefault(file.assembly_key(index), set()).add(file.ids[part.part_number.casefold()][0])
+    found = {}
+    for key, children in wanted.items():
+        assembly = file.assemblies.get(key)
+        if assembly is None:
+            continue
+        there = {line.child_id for line in file.lines.get(assembly.id, ())}
+        for child, ring in find_rings(tx, assembly, children - there).items():
+            found[key, child] = _in_a_ring(assembly.part_number, ring)
+    return found
+
+
+def _file_rings(file: _File) -> dict[int, str]:
+    """Find the rows that stand below themselves, by the file alone."""
+    edges: dict[str, set[str]] = {}
+    for index, part in enumerate(file.parts):
+        if part.key and not part.of.left_out:
+            edges.setdefault(file.assembly_key(index), set()).add(part.key)
+
+    def reaches(start: str, wanted: str) -> bool:
+        seen, queue = {start}, [start]
+        while queue:
+            for below in edges.get(queue.pop(), ()):
+                if below == wanted:
+                    return True
+                if below not in seen:
+                    seen.add(below)
+                    queue.append(below)
+        return False
+
+    found = {}
+    parents = edges.keys()
+    for index, part in enumerate(file.parts):
+        key = file.assembly_key(index)
+        if part.key in parents and part.key != key and not part.of.left_out and reaches(part.key, key):
+            found[index] = (
+                f"Part number: {part.part_number or part.unknown} contains its own assembly in this file"
+            )
+    return found
+
+
+def _in_a_ring(assembly: str, ring: Sequence[str]) -> str:
+    if len(ring) <= 2:
+        return f"Part number: {assembly} is the assembly itself, which cannot be a part of itself"
+    return f"Part number: {ring[1]} contains {assembly} itself ({' → '.join(ring)})"
 
 
 # Rows that differ in one of these are not added up.
-_BESIDE = ("rel_type", "level", "unit", "child_revision", "not_fitted")
+_BESIDE = ("rel_type", "unit", "child_revision")
 
 
-def _added_up(records: Sequence[Record]) -> tuple[list[Record], dict[int, int]]:
-    """Add the quantities of all rows of a part to its first row.
-
-    Returns all rows, and for the number of each other row the number of the first.
+def _add_up(file: _File) -> dict[int, int]:
+    """Add the quantities of all rows of a part to its first row; return the index of the first for each
+    other.
     """
-    first: dict[tuple[str, ...], tuple[int, dict[str, str]]] = {}
-    made: list[Record] = []
+    first: dict[tuple[Any, ...], int] = {}
     added: dict[int, int] = {}
-    for number, record in records:
-        is_part = bool(record.get("part_number") or "unknown" in record)
-        if "quantity_problem" in record or not is_part:
-            made.append((number, record))
+    above = set(file.parents)
+    for index, part in enumerate(file.parts):
+        row = part.of
+        if row.left_out or row.problems or row.quantity is None or not part.key:
             continue
-        key = (_key(record), *(record.get(name, "") for name in _BESIDE))
-        whole = first.get(key)
-        if whole is None:
-            first[key] = number, dict(record)
-            made.append(first[key])
+        key = (file.parents[index], part.key, *(row.texts.get(name, "") for name in _BESIDE))
+        whole = first.setdefault(key, index)
+        if whole == index or index in above:
             continue
-        added[number] = whole[0]
-        made.append((number, record))
-        into = whole[1]
-        into["quantity"] = str(exact_sum(map(Decimal, (into["quantity"], record["quantity"]))))
+        added[index] = whole
+        into = file.parts[whole].of
+        texts = dict(into.texts)
         for name, between in (("reference_designators", " "), ("notes", "; ")):
-            texts = dict.fromkeys(filter(None, (into.get(name), record.get(name))))
-            if texts:
-                into[name] = between.join(texts)
-    return made, added
+            both = dict.fromkeys(filter(None, (into.texts.get(name), row.texts.get(name))))
+            if both:
+                texts[name] = between.join(both)
+        quantity = exact_sum((into.quantity or Decimal(0), row.quantity))
+        doubt = into.doubt or row.doubt
+        file.parts[whole] = file.parts[whole].with_row(
+            replace(into, texts=texts, quantity=quantity, doubt=doubt)
+        )
+    return added
+
+
+def _as_written(before: LineState, name: str, value: Any) -> bool:
+    """Compare a value of a file with the line's; a file drops spaces at the ends, and splits designators."""
+    value_before = getattr(before, name)
+    if name == "reference_designators":
+        return bool(designators(" ".join(value_before)) == value)
+    return isinstance(value_before, str) and value_before.strip() == (value or "")
+
+
+def _changes(row: BomRow, problems: list[str]) -> dict[str, Any]:
+    changes: dict[str, Any] = {} if row.quantity is None else {"quantity": float(row.quantity)}
+    for name in LineTexts.model_fields:
+        if name in row.texts:
+            changes[name] = row.texts[name] or None
+    if kind := row.texts.get(Heading.TYPE):
+        changes["rel_type"] = kind.lower()
+    if Heading.REFERENCE_DESIGNATORS in row.texts:
+        changes["reference_designators"] = designators(row.texts[Heading.REFERENCE_DESIGNATORS])
+    if Heading.REVISION in row.texts:
+        revision = row.texts[Heading.REVISION]
+        changes["child_revision"] = whole_number(revision, 6)
+        if revision and changes["child_revision"] is None:
+            problems.append(f"Revision: wanted a whole number, got {revision[:40]!r}")
+    return changes
 
 
 def apply_import(
     tx: Tx,
     part_number: str,
-    records: Sequence[Record],
+    read: BomRows,
     file_name: str | None,
     expected: int | None,
     allowed: Allowed = NOTHING,
-) -> tuple[ImportPlan, int, int]:
-    """Import the rows of :func:`read_csv` as one change. Returns (what was done, change, version).
+) -> tuple[ImportPlan, list[int], int]:
+    """Import the rows of :func:`read_bom`, all BOMs in one transaction.
 
-    RejectedError lists every problem, and then nothing was changed.
+    Returns (what was done, the change of each BOM, the version of the product's BOM). RejectedError lists
+    every problem, and then nothing was changed.
     """
-    parent = parent_to_change(tx, part_number, expected)
-    plan = plan_import(tx, part_number, records, allowed)
+    product = locked_parent(tx, part_number)
+    check_version(product, expected)
+    numbers = {
+        row.texts.get("part_number", "")
+        for row in read.rows
+        if any(row.parent is not None for row in read.rows)
+    }
+    for item in _assemblies_to_lock(tx, numbers, product):
+        locked_parent(tx, item)
+    plan = plan_import(tx, part_number, read, allowed)
     if plan.problems:
         raise RejectedError(
             f"{len(plan.problems)} problems in the file, so nothing was imported: {plan.problems[0]}",
             plan.problems,
         )
-    changes = []
-    for row in plan.rows:
-        child_id = create_item(tx, row.new)[0].id if row.new else row.child_id
+    made = {index: create_item(tx, row.new)[0] for index, row in enumerate(plan.rows) if row.new}
+    by_key = {
+        plan.rows[index].part_number.casefold() or f"\n{plan.rows[index].name}".casefold(): item
+        for index, item in made.items()
+    }
+    records: dict[str, list[LineRecord]] = {}
+    for index, row in enumerate(plan.rows):
+        key = row.part_number.casefold() or f"\n{row.name}".casefold()
+        child = made.get(index) or by_key.get(key)
+        child_id = child.id if child else row.child_id
+        above = plan.rows[row.above] if row.above is not None else None
+        parent = row.parent
+        if above is not None and not parent:
+            parent = by_key[f"\n{above.name}".casefold()].part_number
         if row.status == "add" and child_id is not None:
-            changes.append(LineRecord(new_line_id(), child_id, None, row.after))
+            records.setdefault(parent, []).append(LineRecord(new_line_id(), child_id, None, row.after))
         elif row.status == "change" and row.line is not None:
-            changes.append(
-                LineRecord(row.line.id, row.line.child_id, row.before, row.after, row.line.position)
+            line = row.line
+            records.setdefault(parent, []).append(
+                LineRecord(line.id, line.child_id, row.before, row.after, line.position)
             )
-    check_no_cycle(tx, parent, [c.child_id for c in changes if c.before is None])
-    text = f"imported: {plan.count('add')} added, {plan.count('change')} changed"
-    note = ChangeNote(kind=ChangeKind.IMPORT, summary=text, document_file=file_name)
-    change_id, version = apply_changes(tx, parent, changes, note)
-    return plan, change_id, version
-
-
-def _in_a_ring(parent: Item, ring: Sequence[str]) -> str:
-    if len(ring) <= 2:
-        return f"Part number: {parent.part_number} is the assembly itself, which cannot be a part of itself"
-    return f"Part number: {ring[1]} contains {parent.part_number} itself ({' → '.join(ring)})"
-
-
-def _plan_row(
-    number: int,
-    record: Mapping[str, str],
-    lines: Mapping[tuple[str, str], Line],
-    numbers: Mapping[str, tuple[int, bool]],
-    category: str,
-) -> ImportRow:
-    name, called = record.get("part_number", ""), record.get("unknown", "")
-    if record.get("level", "1") not in ("", "1") or record.get("not_fitted"):
-        return ImportRow(number, name, "skip", name=called)
-    problems: list[str] = []
-    changes = _changes(record, problems)
-    key = name.casefold()
-    line = lines.get((key, changes.get("rel_type", "component")))
-    child = numbers.get(key) if name else None
-    new, could = None, ""
-    if "several" in record:
-        problems.append(f"Part number: {record['several']}")
-    elif not (name or called):
-        problems.append("Part number: is empty")
-    elif child is None and category:
-        new = _new_item(record, category, problems)
-    elif child is None:
-        problems.append(f"Part number: {name or called!r} does not exist on this server")
-        could = "make"
-    elif child[1] and line is None:
-        problems.append(f"Part number: {name!r} is archived")
-    before = line.state if line else None
-    after = None
-    if not problems:
-        if before:
-            changes = {
-                field: value for field, value in changes.items() if not _as_written(before, field, value)
-            }
-            after = edited_state(before, changes)
-        else:
-            after = LineState(**{"source": "manual", **changes})
-        try:
-            check_state(after)
-        except RejectedError as error:
-            problems.extend(error.problems)
-    if problems:
-        return ImportRow(
-            number, name, "error", problems, name=called, could=could if len(problems) == 1 else ""
+    for missing in plan.missing if plan.removes else ():
+        line = missing.line
+        records.setdefault(missing.parent, []).append(
+            LineRecord(line.id, line.child_id, line.state, None, line.position)
         )
-    status = "add" if before is None else "same" if after == before else "change"
-    child_id = child[0] if child else None
-    return ImportRow(number, name, status, (), before, after, child_id, line, called, new)
+    records.setdefault(product.part_number, [])
+    changes, version = [], product.bom_version
+    for parent, own in records.items():
+        assembly = product if parent == product.part_number else get_item(tx, parent, lock=True)
+        check_no_cycle(tx, assembly, [record.child_id for record in own if record.before is None])
+        change, after = apply_changes(tx, assembly, own, _note(own, file_name))
+        changes.append(change)
+        if assembly.id == product.id:
+            version = after
+    return plan, changes, version
 
 
-def _new_item(record: Mapping[str, str], category: str, problems: list[str]) -> NewItem:
-    """Describe the new part of a row; it is bought if the row names a maker, a supplier or a value."""
-    facts = {role.value: record[role] for role in BOUGHT if record.get(role)}
-    bought = facts or record.get("value")
-    try:
-        number = check_number(record["part_number"]) if record.get("part_number") else None
-    except RejectedError as error:
-        problems.append(str(error))
-        number = None
-    return NewItem(
-        category=category,
-        part_number=number,
-        name=_name_of(record) or record.get("unknown", ""),
-        description=record.get("description", ""),
-        texts={"sourcing_type": "purchased"} if bought else {},
-        properties=facts,
+def _note(records: Sequence[LineRecord], file_name: str | None) -> ChangeNote:
+    added = sum(record.before is None for record in records)
+    removed = sum(record.after is None for record in records)
+    words = f"imported: {added} added, {len(records) - added - removed} changed"
+    words += f", {removed} removed" if removed else ""
+    return ChangeNote(kind=ChangeKind.IMPORT, summary=words, document_file=file_name)
+
+
+def _assemblies_to_lock(tx: Tx, numbers: set[str], product: Item) -> list[str]:
+    """List the other items of a file with levels, in the order in which all imports lock them."""
+    keys = {number.casefold() for number in numbers} - {"", product.part_number.casefold()}
+    query = select(items.c.part_number).where(
+        one_of(tx, items.c.part_number_key, keys), items.c.archived_at.is_(None)
     )
-
-
-def _as_written(before: LineState, field: str, value: Any) -> bool:
-    """Compare a value of a file with the line's; a file drops spaces at the ends, and splits designators."""
-    value_before = getattr(before, field)
-    if field == "reference_designators":
-        return bool(designators(" ".join(value_before)) == value)
-    return isinstance(value_before, str) and value_before.strip() == (value or "")
-
-
-def _changes(record: Mapping[str, str], problems: list[str]) -> dict[str, Any]:
-    changes: dict[str, Any] = {}
-    if "quantity_problem" in record:
-        problems.append(f"Quantity: {record['quantity_problem']}")
-    else:
-        changes["quantity"] = float(record["quantity"])
-    for name in LineTexts.model_fields:
-        if name in record:
-            changes[name] = record[name] or None
-    if record.get("rel_type"):
-        changes["rel_type"] = record["rel_type"].lower()
-    if "reference_designators" in record:
-        changes["reference_designators"] = designators(record["reference_designators"])
-    if "child_revision" in record:
-        revision = record["child_revision"]
-        changes["child_revision"] = whole_number(revision, 6)
-        if revision and changes["child_revision"] is None:
-            problems.append(f"Revision: wanted a whole number, got {revision[:40]!r}")
-    return changes
+    return list(tx.conn.scalars(query.order_by(items.c.id)))

@@ -1994,6 +1994,17 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../revisions/project.py" />
+            <location filename="../../../outbox/status_text.py" />
+            <source>held for your choice</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/project.py" />
+            <source>the server was restored from a backup: it has an older one</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/project.py" />
             <source>its item is not on this server</source>
             <translation type="unfinished" />
         </message>
@@ -2045,6 +2056,16 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../revisions/pulled.py" />
             <source>{name} has edits that are not in Silo; it was left alone.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/pulled.py" />
+            <source>{name} waits to be sent; it was left alone.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/pulled.py" />
+            <source>{name} is newer than the server, which was restored from a backup; it was left alone.</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -2466,11 +2487,6 @@ They are installed in {folder}.</source>
         <message>
             <location filename="../../../outbox/status_text.py" />
             <source>A newer commit of it has arrived since; this one would undo it.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../../outbox/status_text.py" />
-            <source>held for your choice</source>
             <translation type="unfinished" />
         </message>
         <message>

@@ -1995,6 +1995,17 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../revisions/project.py" />
+            <location filename="../../../outbox/status_text.py" />
+            <source>held for your choice</source>
+            <translation>wartet auf Ihre Entscheidung</translation>
+        </message>
+        <message>
+            <location filename="../../revisions/project.py" />
+            <source>the server was restored from a backup: it has an older one</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/project.py" />
             <source>its item is not on this server</source>
             <translation>sein Artikel ist nicht auf diesem Server</translation>
         </message>
@@ -2047,6 +2058,16 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
             <location filename="../../revisions/pulled.py" />
             <source>{name} has edits that are not in Silo; it was left alone.</source>
             <translation>{name} hat Änderungen, die nicht in Silo sind; die Datei blieb unberührt.</translation>
+        </message>
+        <message>
+            <location filename="../../revisions/pulled.py" />
+            <source>{name} waits to be sent; it was left alone.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/pulled.py" />
+            <source>{name} is newer than the server, which was restored from a backup; it was left alone.</source>
+            <translation type="unfinished" />
         </message>
         <message>
             <location filename="../../revisions/pulled.py" />
@@ -2469,11 +2490,6 @@ Sie werden in {folder} installiert.</translation>
             <location filename="../../../outbox/status_text.py" />
             <source>A newer commit of it has arrived since; this one would undo it.</source>
             <translation>Neueres Eingechecktes ist inzwischen angekommen; dies würde es rückgängig machen.</translation>
-        </message>
-        <message>
-            <location filename="../../../outbox/status_text.py" />
-            <source>held for your choice</source>
-            <translation>wartet auf Ihre Entscheidung</translation>
         </message>
         <message>
             <location filename="../../../outbox/status_text.py" />
