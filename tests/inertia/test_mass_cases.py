@@ -131,7 +131,46 @@ CASES = {
     "a part of an unknown material below a row with a mass": Case(
         "arm/motor/rotor; arm/motor/case @ 2",
         "1,1,,,90.0 g,motor | 1.1,1,,Unobtainium,,rotor | 1.2,1,,,,case",
-        [1, 0], "rotor unknown_material, rotor sub_assembly_mass_differs, case no_mass_no_material",
+        [1, 89], "rotor unknown_material, case sub_assembly_mass_shared",
+    ),
+    "what a scale says of a sub-assembly wins over the data of its parts": Case(
+        "arm/motor/rotor; arm/motor/case @ 2",
+        "1,1,,,9.0 g*,motor | 1.1,1,,steel,,rotor | 1.2,1,,steel,,case",
+        [1, 8], "rotor sub_assembly_mass_shared, case sub_assembly_mass_shared", "sum up to 0.07065 kg",
+    ),
+    "a little less than its parts is no rounding": Case(
+        "arm/motor/rotor; arm/motor/case @ 2",
+        "1,1,,,70.2 g*,motor | 1.1,1,,steel,,rotor | 1.2,1,,steel,,case",
+        [7.8, 62.4], "rotor sub_assembly_mass_shared, case sub_assembly_mass_shared",
+    ),
+    "a part that was weighed keeps its mass in a sub-assembly that was weighed": Case(
+        "arm/motor/rotor; arm/motor/case @ 2",
+        "1,1,,,20.0 g*,motor | 1.1,1,,steel,8.00 g*,rotor | 1.2,1,,steel,,case",
+        [8, 12], "case sub_assembly_mass_shared",
+    ),
+    "a sub-assembly that was weighed within one that was weighed": Case(
+        "a/arm/motor/rotor; a/arm/motor/case @ 2; a/arm/cap @ 4",
+        "1,1,,,30.0 g*,arm | 1.1,1,,,18.0 g*,motor | 1.1.1,1,,steel,,rotor | 1.1.2,1,,steel,,case "
+        "| 1.2,1,,steel,,cap",
+        [2, 16, 12],
+        "rotor sub_assembly_mass_shared, case sub_assembly_mass_shared, cap sub_assembly_mass_shared",
+    ),
+    "two scales that contradict each other": Case(
+        "arm/motor/rotor; arm/motor/case @ 2",
+        "1,1,,,20.00 g*,motor | 1.1,1,,,8.00 g*,rotor | 1.2,1,,,8.00 g*,case",
+        [8, 8], "rotor sub_assembly_mass_differs", "were weighed, too",
+    ),
+    "a gap gets the rest of what was weighed, and the parts with data keep theirs": Case(
+        "arm/motor/rotor; arm/motor/case @ 2", "1,1,,,10 g*,motor | 1.1,1,,steel,,rotor | 1.2,1,,,,case",
+        [7.85, 2.15], "case sub_assembly_mass_shared",
+    ),
+    "a gap gets its share also where a sibling has data": Case(
+        "arm/motor/rotor; arm/motor/case @ 2", "1,1,,,10 g,motor | 1.1,1,,steel,,rotor | 1.2,1,,,,case",
+        [7.85, 2.15], "case sub_assembly_mass_shared",
+    ),
+    "a rest within the rounding is not dropped": Case(
+        "arm/motor/rotor; arm/motor/case @ 2", "1,1,,,8 g,motor | 1.1,1,,steel,,rotor | 1.2,1,,,,case",
+        [7.85, 0.15], "case sub_assembly_mass_shared",
     ),
     "the material of a sub-assembly is that of parts that the BOM lacks": Case(
         "arm/print/body a; arm/print/body b; arm/nut", "1,1,,PLA,,print | 2,1,,steel,,nut",

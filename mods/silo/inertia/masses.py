@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Masses: of one product by the spec's rule, with what speaks against it, then of all instances. Pure.
+"""Masses: of one product by the spec's rule, and the evidence against it, then of all instances. Pure.
 
     BOM mass → material × volume → zero and a warning; not in the BOM: default density and a warning.
 
 The density that a geometry file states never outranks the BOM. It is compared, and used in the place of the
-default (or of zero) only if the user asks for it. Rounding, other data and what no matter can weigh speak
-against a mass that the BOM gives.
+default (or of zero) only if the user asks for it. Rounding, other data and a density that no material has
+are evidence against a mass that the BOM gives.
 
 Rows of sub-assemblies never add mass to that of their parts. A row's mass is used if its parts have no
 data of their own: a bought motor is one row of the BOM and twelve parts of the STEP file. Where they have,
 the two are compared. A row without children stands for all below it, so that what its mass leaves after the
-parts that are listed elsewhere belongs to the others.
+parts that are listed elsewhere belongs to the others. A mass that is marked as set by hand is what a scale
+said: it wins at every level. The parts below are scaled to it, but for those that were weighed themselves.
 """
 
 from __future__ import annotations
@@ -278,6 +279,9 @@ MISMATCH_LIMIT = 0.05
 SPREAD_LIMIT = 0.1
 """A material whose density varies by this share or more is reported."""
 
+EXACT = 1e-9
+"""Relative: two sums of the same masses are one number below this."""
+
 LIGHTEST_PART = 12.0
 """[kg/m^3] a part that weighs less by the BOM is doubted: foams have 15 and more, and grams that were read as
 kilograms make 1.7 to 11 of a metal."""
@@ -467,6 +471,9 @@ class Groups:
     """The masses and decisions of all instances, while sub-assembly rows may still change them.
 
     ``mass`` and ``decisions`` are changed in place; instances that are not ``counted`` are left alone.
+
+    weighed
+        (N,) bool: instances whose mass a scale said, alone or with others. They keep it at every level above.
     """
 
     assembly: Assembly
@@ -475,6 +482,7 @@ class Groups:
     decisions: list[MassDecision]
     counted: NDArray[np.bool_]
     rule: MassRule
+    weighed: NDArray[np.bool_]
     _made: dict[tuple[Match, MassDecision, str], MassDecision] = field(default_factory=dict)
 
     def apply(self, matches: Mapping[str, Match]) -> Iterator[PlacedAssembly]:
@@ -488,10 +496,11 @@ class Groups:
                     self._cover(match, gaps)
                 continue
             left = row.mass_kg - float(self.mass[with_data].sum())
-            stands_for_all = not row.has_children and left > row.quantum_kg
             agrees = True
-            if gaps and (not with_data or stands_for_all):
+            if gaps and (left > 0 or not with_data):
                 self._share(match, gaps, left, partly=bool(with_data))
+            if row.overridden:
+                agrees = self._weigh(match, below)
             elif with_data:
                 agrees = self._compare(match, below, with_data[0])
             volume = float(self.volume[below].sum())
@@ -542,16 +551,58 @@ class Groups:
             )
             self._set(index, match, new)
 
-    def _compare(self, match: Match, below: list[int], first: int) -> bool:
+    def _weigh(self, match: Match, below: list[int]) -> bool:
+        """Scale the parts of a sub-assembly to what a scale said of it, but for those that were weighed."""
+        row, stated = match.row, match.row.mass_kg or 0.0
+        rest = [index for index in below if not self.weighed[index]]
+        total = float(self.mass[below].sum())
+        left = stated - (total - float(self.mass[rest].sum()))
+        if not rest or left <= EXACT * stated:
+            return self._compare(match, below, below[0], row.quantum_kg, "were weighed, too, and were used")
+        if abs(total - stated) > EXACT * stated:
+            weights = next(
+                (w for w in (self.mass[rest], self.volume[rest]) if w.sum() > 0), np.ones(len(rest))
+            )
+            self.mass[rest] = left * weights / weights.sum()
+            note = Note(
+                MassCode.SUB_ASSEMBLY_SHARED,
+                f"the BOM's {stated:.6g} kg for “{row.name}” around it are marked as set by hand: its parts "
+                f"sum up to {total:.6g} kg, and were scaled to it",
+            )
+            for index in rest:
+                old = self.decisions[index]
+                new = replace(
+                    old,
+                    source=Source.SUB_ASSEMBLY_MASS,
+                    mass_kg=None,
+                    density=None,
+                    density_source="",
+                    quantum_kg=row.quantum_kg,
+                    notes=(*old.notes, note),
+                )
+                self._set(index, match, new)
+        self.weighed[below] = True
+        return True
+
+    def _compare(
+        self,
+        match: Match,
+        below: list[int],
+        first: int,
+        allowed: float | None = None,
+        why: str = "were used",
+    ) -> bool:
         row = match.row
         total = float(self.mass[below].sum())
         stated = row.mass_kg or 0.0
-        if abs(total - stated) <= max(row.quantum_kg, MISMATCH_LIMIT * stated):
+        if allowed is None:
+            allowed = max(row.quantum_kg, MISMATCH_LIMIT * stated)
+        if abs(total - stated) <= allowed:
             return True
         note = Note(
             MassCode.SUB_ASSEMBLY,
             f"the parts of “{row.name}” sum up to {total:.6g} kg, its own row says {stated:.6g} kg; "
-            "the parts were used",
+            f"the parts {why}",
         )
         old = self.decisions[first]
         if note not in old.notes:
@@ -597,6 +648,8 @@ class Placed:
         (N,) bool; False for wires and surfaces that merely stand beside a solid of the same product.
     groups
         placed sub-assemblies whose BOM row gives a mass.
+    on_scale
+        (N,) bool: what the BOM marks as set by hand, of the part or of a sub-assembly around it.
     """
 
     volume: Floats
@@ -606,6 +659,7 @@ class Placed:
     decisions: Sequence[MassDecision]
     counted: NDArray[np.bool_]
     groups: Sequence[PlacedAssembly] = ()
+    on_scale: NDArray[np.bool_] | None = None
 
     def inertia(self, index: NDArray[np.intp]) -> Floats:
         """Return the tensors (n, 3, 3) [kg m^2] of these instances, about their own centres of mass."""
@@ -635,8 +689,12 @@ def place_all(assembly: Assembly, rule: MassRule, matching: Matching) -> Placed:
         float,
     ).reshape(len(instances))
     mass[~counted] = 0.0
-    groups = tuple(Groups(assembly, volume, mass, decisions, counted, rule).apply(matching.groups))
-    return Placed(volume, com, unit, mass, decisions, counted, groups)
+    by_scale = {
+        key for key, found in matching.parts.items() if found.row.overridden and found.row.mass_kg is not None
+    }
+    on_scale = np.array([i.prototype in by_scale for i in instances], bool)
+    groups = tuple(Groups(assembly, volume, mass, decisions, counted, rule, on_scale).apply(matching.groups))
+    return Placed(volume, com, unit, mass, decisions, counted, groups, on_scale)
 
 
 def weighed(placed: Placed, groups: Sequence[tuple[str, Sequence[int], float]]) -> tuple[Placed, list[Note]]:
@@ -653,6 +711,11 @@ def weighed(placed: Placed, groups: Sequence[tuple[str, Sequence[int], float]]) 
         members = [index for index in indices if placed.counted[index]]
         rest = [index for index in members if decisions[index].source is not Source.TARGET_MASS]
         left = kg - float(mass[members].sum() - mass[rest].sum())
+        if placed.on_scale is not None:  # what the BOM says of a scale stays, unless it is of these parts
+            others = [index for index in rest if not placed.on_scale[index]]
+            left_for_others = kg - float(mass[members].sum() - mass[others].sum())
+            if others and left_for_others > 0:
+                rest, left = others, left_for_others
         weights = next((w for w in (mass[rest], placed.volume[rest]) if w.sum() > 0), np.ones(len(rest)))
         if not members or not (left > 0 if rest else abs(left) <= MISMATCH_LIMIT * kg):
             why = f"its weighed parts sum up to {kg - left:.6g} kg" if members else "nothing is called so"

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -81,6 +83,89 @@ def assemblies(draw: st.DrawFn) -> Assembly:
             where = placement([draw(st.floats(-1, 1)) for _ in range(3)])
             instances.append(Instance((top, group, f"{key}-{copy}"), (top, group, name), key, where))
     return Assembly("asm", prototypes, tuple(instances))
+
+
+@dataclass
+class Tree:
+    """A product with what its BOM row says: ``star`` [kg] is what a scale said."""
+
+    name: str
+    star: float | None
+    plain: float | None
+    material: str | None
+    below: list[Tree] = field(default_factory=list)
+
+    def leaves(self) -> list[Tree]:
+        """All parts in it."""
+        return [leaf for child in self.below for leaf in child.leaves()] if self.below else [self]
+
+
+@st.composite
+def trees(draw: st.DrawFn) -> Tree:
+    """A tree of three levels, with stars, masses, materials and gaps at every level."""
+    count = itertools.count()
+
+    def tree(depth: int) -> Tree:
+        mass = st.sampled_from([None, None, 0.004, 0.05, 0.5])
+        made = Tree(f"n{next(count)}", draw(mass), draw(mass), draw(st.sampled_from([None, "steel", "PLA"])))
+        if depth < 3 and (depth == 0 or draw(st.booleans())):
+            made.below = [tree(depth + 1) for _ in range(draw(st.integers(1, 3)))]
+        return made
+
+    return tree(0)
+
+
+def _of_scales(tree: Tree) -> tuple[float, bool]:
+    """What scales said of parts in a tree [kg], and whether a part of it was on no scale."""
+    below = [_of_scales(child) for child in tree.below]
+    weighed, free = sum(kg for kg, _ in below), any(free for _, free in below) or not below
+    if tree.star is None or (below and (not free or weighed > tree.star * (1 - 1e-9))):
+        return weighed, free
+    return tree.star, False
+
+
+@quietly
+@given(trees())
+def test_what_was_weighed_is_what_is_counted(compute: Compute, top: Tree) -> None:
+    """Each starred mass is that of its parts; where scales contradict each other, there is a warning."""
+    rows, prototypes, instances, stars = [], {}, [], []
+
+    def add(tree: Tree, path: tuple[str, ...], level: int) -> None:
+        if level:
+            mass = tree.plain if tree.star is None else tree.star
+            rows.append(
+                BOMEntry(
+                    name=tree.name,
+                    material=tree.material if not tree.below else None,
+                    mass_kg=mass,
+                    quantity=1.0,
+                    quantum_kg=0.0005 if mass is not None else 0.0,
+                    overridden=tree.star is not None,
+                    level=level,
+                    line=len(rows) + 2,
+                )
+            )
+            path = (*path, tree.name)
+            if tree.star is not None:
+                stars.append(tree)
+        for child in tree.below:
+            add(child, path, level + 1)
+        if not tree.below:
+            prototypes[tree.name] = box(tree.name, 0.01, 0.02, 0.1, key=tree.name)
+            instances.append(Instance(path, path, tree.name, placement([0.1 * len(instances), 0, 0])))
+
+    add(top, (), 0)
+    if not all(instance.path for instance in instances):
+        return
+    report = compute(Assembly("asm", prototypes, tuple(instances)), BomTable(with_structure(rows)))
+    mass = {part.name: part.mass for _, part in report.parts()}
+    for tree in stars:
+        expected, free = _of_scales(tree)
+        total = sum(mass[leaf.name] for leaf in tree.leaves())
+        if not free:
+            assert total == pytest.approx(expected, rel=1e-9), tree.name
+        if abs(total - (tree.star or 0)) > 0.0005 + 1e-12:
+            assert any(f"“{tree.name}”" in w.message and "were weighed" in w.message for w in report.warnings)
 
 
 @quietly
