@@ -15,7 +15,8 @@ from silo.bom.consolidation import consolidation_findings
 from silo.bom.findings import respelt_findings
 from silo.bom.items.resolve import unregistered_findings
 from silo.bom.walk.document import LinkProblem
-from silo.bom.walk.roles import Files, Reader
+from silo.bom.walk.facts import Files
+from silo.bom.walk.roles import Reader
 
 
 class Scene:
@@ -92,6 +93,18 @@ def draft_array(scene: Scene) -> Any:
     return scene.top.add("Part::FeaturePython", "Array", Base=base, Count=3)
 
 
+def visible_original(scene: Scene) -> Any:
+    base = scene.top.link("Base", scene.bolt)
+    array = scene.top.add("Part::FeaturePython", "Array", Base=base, Count=3)
+    return scene.top.folder("Both", base, array)
+
+
+def modified_here(scene: Scene) -> Any:
+    plate = scene.top.link("Plate", scene.bolt, Visibility=False)
+    cut = scene.top.add("Part::Cut", "Cut", Base=plate, Tool=scene.top.body("Drill", Visibility=False))
+    return scene.top.folder("Drilled", plate, cut)
+
+
 def screw(doc: Doc, name: str = "Screw", **properties: Any) -> Any:
     values = {"Type": "ISO4762", "Diameter": "M4", "Length": "16", **properties}
     return doc.add("Part::FeaturePython", name, **values)
@@ -163,6 +176,13 @@ SCENES: dict[FindingCode, Callable[[], Iterable[Finding]]] = {
     FindingCode.EXCLUDED: met_by_a_member(lambda s: s.top.link("L", s.bolt, SiloBomExclude=True)),
     FindingCode.MIRRORED: met_by_a_member(lambda s: s.top.link("L", s.bolt, ScaleVector=(-1.0, 1.0, 1.0))),
     FindingCode.VARIANT: met_by_a_member(variant),
+    FindingCode.SCALED: met_by_a_member(lambda s: s.top.link("L", s.bolt, ScaleVector=(2.0, 2.0, 2.0))),
+    FindingCode.HIDDEN: met_by_a_member(lambda s: s.top.link("L", s.bolt, Visibility=False)),
+    FindingCode.COINCIDENT: met_by_a_member(visible_original),
+    FindingCode.MODIFIED_HERE: met_by_a_member(modified_here),
+    FindingCode.DELETED_COPY: met_by_a_member(
+        lambda s: s.top.link("L", None, LinkCopyOnChange="Enabled", LinkCopyOnChangeSource=s.bolt)
+    ),
     FindingCode.DRAFT_ARRAY: met_by_a_member(draft_array),
     FindingCode.ARRAY_SIZE: met_by_a_member(
         lambda s: s.top.add("Part::FeaturePython", "Array", Base=s.top.link("Base", s.bolt), Count=0)
@@ -210,6 +230,7 @@ BLOCKING = {
     FindingCode.LFS_POINTER,
     FindingCode.OUTSIDE_ROOT,
     FindingCode.BROKEN_LINK,
+    FindingCode.DELETED_COPY,
     FindingCode.LOST_ASSEMBLY,
     FindingCode.CYCLE,
     FindingCode.TOO_DEEP,

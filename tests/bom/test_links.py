@@ -138,7 +138,8 @@ def test_hidden_links_count() -> None:
     asm = top.assembly(top.link("L1", bolt_in(Visibility=False), Visibility=False))
     found = extract(asm)
     assert counts(found.entries) == {("/v/bolt.FCStd", "Body"): 1}
-    assert found.findings == ()
+    (finding,) = found.findings
+    assert finding.message == "Hidden in Assembly: 1 piece counts: L1."
 
 
 def test_a_link_python_is_a_link() -> None:

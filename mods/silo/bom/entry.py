@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.frozen import Frozen, freeze
 from silo.bom.walk.standard import STANDARD_PARTS, standard_uuid
+from silo.bom.walk.variants import variant_key
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,13 @@ class BomEntry:
         direct children without a part number, which ``children`` no longer has once they are resolved.
     own
         what an assembly shows of its own file and is no item yet: never sent, until a person declares it.
+    variant
+        the values of a configured copy ("L = 300 mm"); ``doc_path`` and ``object_name`` are its original's,
+        the children its own. "" for anything else.
+    copy
+        (file, object) of the configured copy.
+    is_own_item
+        True for a variant with an identity of its own; any other is counted under its original's number.
     """
 
     doc_path: str
@@ -78,16 +86,22 @@ class BomEntry:
     unregistered: tuple[BomEntry, ...] = field(default=Frozen(), compare=False, repr=False)
     own: tuple[BomEntry, ...] = field(default=Frozen(), compare=False, repr=False)
 
+    variant: str = ""
+    copy: tuple[str, str] = field(default=("", ""), compare=False, repr=False)
+    is_own_item: bool = field(default=False, compare=False)
+
     def __post_init__(self) -> None:
         freeze(self, "children", "instances", "also", "unregistered", "own")
 
     @property
     def key(self) -> tuple[str, str]:
-        """Return the key of a component: (file, object), or the designation of a standard part. Never a
-        label.
+        """Return the key of a component: (file, object), with the values of a variant; or the designation of
+        a standard part. Never a label.
         """
         if self.is_standard:
             return (STANDARD_PARTS, self.standard or "")
+        if self.variant:
+            return variant_key((self.doc_path, self.object_name), self.variant)
         return (self.doc_path, self.object_name)
 
     @property

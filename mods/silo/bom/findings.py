@@ -95,6 +95,14 @@ class FindingCode(StrEnum):
         "{file} lies outside the folder that may be read",
         "used by {users}",
     )
+    DELETED_COPY = (
+        "deleted_copy",
+        _E,
+        "the configured copy that a link showed was deleted",
+        "set the link again, or delete it; FreeCAD shows nothing there",
+        "The changed copy that a link showed in {file} was deleted, so FreeCAD shows nothing",
+        "used by {users}",
+    )
     BROKEN_LINK = (
         "broken_link",
         _E,
@@ -172,12 +180,21 @@ class FindingCode(StrEnum):
         "{obj} is a mirrored {target} and counted as one; the other hand of a part usually needs a number"
         " of its own.",
     )
+    SCALED = (
+        "scaled",
+        _W,
+        "a part that a link makes larger or smaller, counted as the part itself",
+        "make the scaled part a separate part if it is bought or made differently",
+        "{obj} is a scaled {target} and counted as one; another size of a part usually needs a number of its"
+        " own.",
+    )
     VARIANT = (
         "variant",
         _W,
-        "a variant, counted as the part itself",
-        "save the variant as a separate part if it needs a number",
-        "{obj} is a variant of {target} (copy on change) and counted as one of it.",
+        "a variant with values of its own, in the line of its original's number",
+        "`silo-mod register TOP.FCStd --declare OBJECT` gives the variant a number of its own",
+        "{obj} is a variant of {target} ({values}): a line of its own here, and counted under the number of"
+        " {target} until it has one.",
     )
     DRAFT_ARRAY = (
         "draft_array",
@@ -200,6 +217,28 @@ class FindingCode(StrEnum):
         "used up by another object, so not counted",
         "nothing, if nobody buys or makes it separately; else take it out of the cut or fusion",
         "{obj} is used up by {target} (a cut, a boolean or a fusion) and not counted.",
+    )
+    COINCIDENT = (
+        "coincident",
+        _I,
+        "an object lies where another shows it again",
+        "hide the original of an array, or the members of a compound",
+        "{target} shows {obj} at the place of {obj}, so it is counted once.",
+    )
+    HIDDEN = (
+        "hidden",
+        _I,
+        "hidden pieces, counted or not",
+        "press *Count It* or *Reference*, or `silo-mod register TOP.FCStd --count OBJECT` or `--not-a-part"
+        " OBJECT`; the file keeps the answer",
+        "Hidden in {obj}: {what}.",
+    )
+    MODIFIED_HERE = (
+        "modified_here",
+        _I,
+        "linked parts that the assembly machines or joins",
+        "nothing; the linked parts count, and their new shape is what is weighed",
+        "{obj} is made here of linked parts ({parts}): they count once, and {obj} is no part of its own.",
     )
     NO_HARDWARE = (
         "no_hardware",

@@ -18,7 +18,7 @@ from silo.bom.findings import Finding, FindingCode, Place, Severity
 
 FORMAT = 1
 
-_ELSEWHERE = frozenset({"children", "instances", "also", "unregistered", "own"})
+_ELSEWHERE = frozenset({"children", "instances", "also", "unregistered", "own", "copy"})
 
 _PLAIN_FIELDS = tuple(f.name for f in fields(BomEntry) if f.name not in _ELSEWHERE)
 
@@ -77,6 +77,8 @@ class _Table:
             if name not in _ELSEWHERE and (name not in _USUAL or value != _USUAL[name])
         }
         row |= {"children": children, "instances": list(entry.instances)}
+        if entry.variant:
+            row["copy"] = list(entry.copy)
         if entry.own:
             row["own"] = [self.add(bom_entry) for bom_entry in entry.own]
         self.rows.append(row)
@@ -87,7 +89,9 @@ def _entry(row: Mapping[str, Any], before: list[BomEntry]) -> BomEntry:
     children = tuple(before[number] for number in row["children"])
     plain = {name: row[name] for name in _PLAIN_FIELDS if name in row}
     mine = tuple(before[number] for number in row.get("own", ()))
-    return BomEntry(**plain, children=children, instances=tuple(row["instances"]), own=mine)
+    path, name = row.get("copy", ("", ""))
+    instances = tuple(row["instances"])
+    return BomEntry(**plain, children=children, instances=instances, own=mine, copy=(path, name))
 
 
 def _plain_finding(finding: Finding) -> dict[str, Any]:

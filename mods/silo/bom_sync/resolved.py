@@ -187,7 +187,9 @@ def assemblies(resolved: Resolved) -> Iterator[Resolved]:
             if entry.is_assembly and entry.key not in seen:
                 seen.add(entry.key)
                 yield from below(entry.children)
-                yield entry
+                # What a variant holds is not the BOM of its original, whose number it has.
+                if not entry.variant or entry.is_own_item:
+                    yield entry
 
     # Sub-assemblies without a number hang in `unresolved`; their own sub-assemblies are synced anyway.
     for entry in below((*resolved.unresolved, *resolved.entries)):

@@ -37,6 +37,9 @@ _GEOMETRY = frozenset({Kind.LOCAL, Kind.NOTHING, Kind.FOLDER})
 # What a target is and which item it is: without these a link to it would only be guessed at.
 _SAID_OF_ITSELF = ("SiloItemId", "SiloUUID", "Type")
 _BREP_TEXT = (b"CASCADE Topology", b"DBRep_DrawableShape")
+# The type of a shape stands alone in its line (BRepTools_ShapeSet).
+_SOLID = re.compile(rb"^So\s*$", re.MULTILINE)
+_VIEW = b"GuiDocument.xml"
 _MANY_OBJECTS = 20_000
 # Of so many objects a large document keeps what it has read. One with a long list, such as the assembly,
 # costs too much to be read twice.
@@ -272,6 +275,22 @@ class FcstdDocument:
         # The last line says where the shape is placed.
         body = data[begin:].rstrip().rpartition(b"\n")[0] if begin > 0 else data
         return hashlib.sha256(body).hexdigest()
+
+    def has_solid(self, entry_name: str) -> bool | None:
+        """Return True if a shape in a side entry holds a solid; None if that cannot be read."""
+        entry = self._entries.get(entry_name.encode()) if entry_name else None
+        if entry is None or entry.size > self._xml.limits.side_entry:
+            return None
+        data = self._side_entry(entry)
+        return _SOLID.search(data) is not None if data.lstrip().startswith(_BREP_TEXT) else None
+
+    @cached_property
+    def has_view(self) -> bool:
+        """Return True if a FreeCAD with a window saved the file."""
+        try:
+            return any(self.content.directory.entries(_VIEW))
+        except ValueError as error:
+            raise FcstdError(self.FileName, str(error)) from error
 
     @cached_property
     def _entries(self) -> dict[bytes, ZipEntry]:

@@ -37,7 +37,7 @@ _KINDS: dict[str, type] = {
     "VisibilityList": tuple,
 }
 
-_ALIKE = frozenset({"ElementCount", "LinkCopyOnChange", "Scale", "ScaleVector"})
+_ALIKE = frozenset({"ElementCount", "LinkCopyOnChange", "Scale", "ScaleVector", "Visibility"})
 
 
 @cache
@@ -151,6 +151,15 @@ class FcstdObject:
         """
         value = self.properties.value("Shape") if "Shape" in self.properties.numbers else None
         return self.Document.shape_key(value.name) if isinstance(value, ShapeFile) else ""
+
+    def has_solid(self) -> bool | None:
+        """Return True if the stored shape holds a solid; None if it has no shape that can be read."""
+        value = self.properties.value("Shape") if "Shape" in self.properties.numbers else None
+        return self.Document.has_solid(value.name) if isinstance(value, ShapeFile) else None
+
+    def getTypeIdOfProperty(self, name: str) -> str:
+        """Return the type of a property, such as ``App::PropertyLength``; "" if there is none."""
+        return self.properties.type_of(name) if name in self.properties.numbers else ""
 
     def _load(self) -> None:
         mine = self.__dict__

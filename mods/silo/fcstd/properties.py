@@ -52,7 +52,7 @@ _KEPT = frozenset(
     {
         *("Base", "Count", "ElementCount", "ElementList", "Group", "Label", "LinkCopyOnChange"),
         *("LinkCopyOnChangeSource", "LinkedObject", "Meta", "Scale", "ScaleList", "ScaleVector"),
-        *("SiloBomExclude", "SiloItemId", "SiloUUID", "Suppressed", "Type"),
+        *("Visibility", "SiloBomExclude", "SiloItemId", "SiloUUID", "Suppressed", "Type"),
     }
 )
 
@@ -135,6 +135,10 @@ class Properties:
         piece = self.piece(name)
         value = self.quick_value(piece)
         return value_of(self._careful_node(piece)) if value is None else value
+
+    def type_of(self, name: str) -> str:
+        """Return the type of a property of the table, as FreeCAD names it."""
+        return self._careful_node(self.piece(name)).attributes.get("type", "")
 
     def quick_value(self, piece: bytes) -> Any:
         """Read the value of a piece in FreeCAD's own form; None if it has another form."""

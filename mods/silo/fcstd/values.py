@@ -128,6 +128,11 @@ def _map(node: XmlElement, _: str) -> dict[str, str]:
     return {a["key"]: a.get("value", "") for a in items if "key" in a}
 
 
+def _formulas(node: XmlElement) -> tuple[tuple[str, str], ...]:
+    formulas = (child.attributes for child in node.children if child.tag == "Expression")
+    return tuple((a.get("path", ""), a.get("expression", "")) for a in formulas)
+
+
 def _class(node: XmlElement) -> Any:
     """Return the class of a Python object as (module, name); the object itself is never made."""
     module = node.attributes.get("module", "")
@@ -179,6 +184,7 @@ _READERS: dict[str, Callable[[XmlElement, str], Any]] = {
     "Integer": lambda node, _: _integer(node.attributes.get("value", "")),
     "Bool": lambda node, _: {"true": True, "false": False}.get(node.attributes.get("value", ""), ABSENT),
     "Float": lambda node, _: _float(node.attributes.get("value", "")),
+    "ExpressionEngine": lambda node, _: _formulas(node),
     "PropertyVector": _vector,
     "BoolList": _bools,
     "IntegerList": _integers,

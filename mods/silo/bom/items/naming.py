@@ -47,4 +47,5 @@ def display_name(entry: BomEntry) -> str:
     if entry.standard:
         return entry.standard
     label = clean_name(entry.label)
-    return label if label and not _GENERIC.match(label) else clean_name(entry.document_label) or label
+    name = label if label and not _GENERIC.match(label) else clean_name(entry.document_label) or label
+    return f"{name}, {entry.variant}" if entry.variant else name

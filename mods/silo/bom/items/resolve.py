@@ -45,7 +45,8 @@ def resolve_with(entries: Sequence[BomEntry], items: Known) -> tuple[list[BomEnt
         number = item.get("part_number") if item is not None else None
         name = (item.get("name") or item.get("description") or number) if item is not None else None
         if not number:
-            missing.setdefault(entry.key, entry)
+            # A variant takes the number of its original, which is to be registered.
+            missing.setdefault((entry.doc_path, entry.object_name) if entry.variant else entry.key, entry)
         bom_entry = replace(
             entry,
             part_number=number or None,
@@ -91,6 +92,8 @@ def merge_lines(entries: Iterable[BomEntry]) -> list[BomEntry]:
         if before is None:
             lines[name] = entry
             continue
+        if before.variant and not entry.variant:  # the line is that of the original
+            before, entry = entry, before
         lines[name] = replace(
             before,
             also=(*before.also, entry.key, *entry.also),

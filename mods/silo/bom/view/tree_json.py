@@ -30,6 +30,7 @@ def entry_json(entry: BomEntry, base: str) -> dict[str, Any]:
         "missing": entry.missing,
         "level": entry.level,
         "consolidation_warning": entry.consolidation_warning,
+        **({"variant": entry.variant} if entry.variant else {}),
         "children": [entry_json(child, base) for child in entry.children],
         **({"own": [entry_json(bom_entry, base) for bom_entry in entry.own]} if entry.own else {}),
     }

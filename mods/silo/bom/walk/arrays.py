@@ -38,8 +38,21 @@ def array_count(link: object) -> int:
     return max(0, count - sum(map(bool, map(left_out_by, elements(link)))))
 
 
+def draft_elements(array: object) -> tuple[Any, ...]:
+    """Return the elements of an expanded Draft array; () if it is not expanded."""
+    return tuple(own(array, "ElementList") or ())
+
+
 def draft_count(array: object) -> int | None:
-    """Count the instances of a Draft array; None if neither its count nor its pattern gives the number."""
+    """Count the instances of a Draft array; None if neither its count nor its pattern gives the number.
+
+    Elements that are left out one by one do not count.
+    """
+    count = _all_of_draft(array)
+    return None if count is None else max(0, count - sum(map(bool, map(left_out_by, draft_elements(array)))))
+
+
+def _all_of_draft(array: object) -> int | None:
     count = own(array, "Count")
     if isinstance(count, int) and count > 0:
         return count

@@ -27,6 +27,9 @@ class ObjectRole(Enum):
     CONSTRUCTION = "construction"  # brings nothing
     LEFT_OUT = "left out"  # suppressed or excluded, itself or with what holds it
     LOOSE = "loose"  # beside the assembly
+    MODIFIED = "modified here"  # made of linked parts, which count
+    REFERENCE = "reference"  # a hidden link that only supports other geometry
+    HIDDEN = "hidden"  # geometry of this file that is hidden, and not asked for
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +96,14 @@ class Count:
         return self.shown.brings[self.key][0]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Modified:
+    """A feature over linked parts, and the keys of the objects in the assembly that it consumes."""
+
+    feature: Any
+    operands: frozenset[Key]
+
+
 @dataclass(slots=True)
 class Contents:
     """One assembly as it stands in its file.
@@ -107,6 +118,10 @@ class Contents:
         True for a document that is the one part which lies in it.
     hidden
         geometry of this file that is hidden beside what is shown, and not counted.
+    hidden_counted, references
+        what is hidden and counts, and hidden links that only support other geometry.
+    modified
+        features made of linked parts: their shapes are what is there, in place of those parts.
     """
 
     counts: list[Count] = field(default_factory=list)
@@ -116,6 +131,9 @@ class Contents:
     is_part: bool = False
     hidden: list[Any] = field(default_factory=list)
     tree: Tree | None = None
+    hidden_counted: list[Any] = field(default_factory=list)
+    references: list[Any] = field(default_factory=list)
+    modified: list[Modified] = field(default_factory=list)
 
     def is_assembly(self, container: Any) -> bool:
         """Return True if the parts of its own file that it shows are parts of an assembly; the bodies of a

@@ -70,7 +70,7 @@ _ASKED_FOR = {name for _, names in _MARKS for name in names}
 _NO_GEOMETRY = (
     *("Part::Part2DObject", "Part::Datum", "PartDesign::SubShapeBinder", "PartDesign::ShapeBinder"),
     *("App::DatumElement", "Part::Vertex", "Part::Line", "Part::Plane", "Part::Circle", "Part::Ellipse"),
-    *("Part::Polygon", "Part::RegularPolygon", "Part::Helix", "Part::Spiral"),
+    *("Part::Section", "Part::Polygon", "Part::RegularPolygon", "Part::Helix", "Part::Spiral"),
 )
 
 _GEOMETRY = ("Part::Feature", "Mesh::Feature", "Points::Feature")
@@ -180,6 +180,15 @@ def sources(repeater: object) -> list[Any]:
             several = value if isinstance(value, list) or name in ("Links", "Objects") else (value,)
             return [source for member in several if (source := first_of(member)) is not None]
     return []
+
+
+def has_solid(obj: object) -> bool:
+    """Return True if the shape of an object holds a solid, or if that is not known; a wire of Draft has
+    none.
+    """
+    ask = getattr(obj, "has_solid", None)
+    answer = ask() if callable(ask) else None
+    return not has_own(obj, "Points") if answer is None else bool(answer)
 
 
 def is_assembly3(obj: object) -> bool:

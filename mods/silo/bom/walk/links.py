@@ -27,14 +27,15 @@ from silo.bom.key import Key
 from silo.bom.walk.chains import chains
 from silo.bom.walk.contents import Count, Lost
 from silo.bom.walk.document import NAMELESS, label_of, own
-from silo.bom.walk.identity import identity_of, sole_identity
+from silo.bom.walk.facts import Canonical, Files
+from silo.bom.walk.identity import identity_of, own_identity, sole_identity
 from silo.bom.walk.joints import held_by_joints, is_attached
 from silo.bom.walk.kinds import Kind, is_container, is_named_assembly
-from silo.bom.walk.roles import Canonical, Files
 from silo.bom.walk.roots import Whole, as_it_is, beside, choose_assembly, fates, silent_reader
 from silo.bom.walk.shared_identity import identity_findings
 from silo.bom.walk.standard import same_articles, standard_uuid
 from silo.bom.walk.targets import Inspect, resolve_target
+from silo.bom.walk.variants import Variant
 
 # Real assemblies are some ten levels deep; deeper is an attack or a loop that no other guard saw.
 MAX_LEVELS = 64
@@ -243,6 +244,8 @@ class _Walker:
         if isinstance(obj, Lost):
             stem = os.path.splitext(os.path.basename(path.replace("\\", "/")))[0]
             return BomEntry(path, object_name=name, missing=True, label=obj.label, document_label=stem)
+        if key not in self._heads and (variant := self.reader.variant_of(obj)) is not None:
+            self._heads[key] = self._variant_entry(variant)
         if key not in self._heads:
             standard, registered = self.reader.standard(obj)
             if standard and not registered:  # where it first occurs
@@ -257,6 +260,22 @@ class _Walker:
                 is_assembly=is_named_assembly(obj),
             )
         return self._heads[key]
+
+    def _variant_entry(self, variant: Variant) -> BomEntry:
+        """Make the entry of a configured copy: that of its original, with values.
+
+        It may have an identity of its own; FreeCAD copies that of the original.
+        """
+        base = self.entry_for(variant.base)
+        identity = own_identity(variant.link) or own_identity(variant.copy)
+        is_own_item = identity is not None and identity != own_identity(variant.base)
+        return replace(
+            base,
+            silo_uuid=identity if is_own_item else base.silo_uuid,
+            variant=variant.values,
+            copy=self._files.key(variant.copy),
+            is_own_item=is_own_item,
+        )
 
     def tree(self, top: Any, level: int) -> tuple[BomEntry, ...]:
         """Return the direct children of the top, with all that is below them."""

@@ -13,7 +13,9 @@ from typing import Any
 from silo.bom.entry import BomEntry
 from silo.bom.errors import DocumentError, listed
 from silo.bom.findings import Finding, FindingCode, Place, Severity
+from silo.bom.message import counted_message
 from silo.bom.walk.document import DocumentRoot, LinkProblem, label_of, object_name, saved_by
+from silo.bom.walk.seen import is_said_to_count
 
 _Slot = tuple[FindingCode, str]
 
@@ -21,7 +23,7 @@ _Slot = tuple[FindingCode, str]
 _OF_LINKS = (
     *(FindingCode.MISSING_FILE, FindingCode.MISSING_OBJECT, FindingCode.UNREADABLE_FILE),
     *(FindingCode.LFS_POINTER, FindingCode.OUTSIDE_ROOT, FindingCode.LOST_ASSEMBLY),
-    *(FindingCode.UNSET_LINK, FindingCode.CYCLE),
+    *(FindingCode.UNSET_LINK, FindingCode.CYCLE, FindingCode.DELETED_COPY),
 )
 
 _KNOWN_LINKS = frozenset(
@@ -130,7 +132,7 @@ class Notes:
             part=problem.obj or "that it is asked for",
             detail=problem.detail,
         )
-        if code is not FindingCode.UNSET_LINK:
+        if code not in (FindingCode.UNSET_LINK, FindingCode.DELETED_COPY):
             note.file = problem.file
 
     def unreadable(self, obj: Any, error: DocumentError) -> None:
@@ -208,6 +210,35 @@ class Notes:
             links=sum(line.quantity for line in lines),
             names=listed(sorted(entry.label for entry in lines), 8),
         )
+
+    def hidden(
+        self, container: Any, counted: Sequence[Any], not_counted: Sequence[Any], references: Sequence[Any]
+    ) -> None:
+        """Say in one sentence which hidden objects of an assembly count, and which do not."""
+        groups = (
+            (counted, counted_message(len(counted), "{n} piece counts", "{n} pieces count")),
+            (not_counted, counted_message(len(not_counted), "{n} body does not", "{n} bodies do not")),
+            (
+                references,
+                counted_message(
+                    len(references),
+                    "{n} link is only a reference and does not",
+                    "{n} links are only references and do not",
+                ),
+            ),
+        )
+        parts = [
+            f"{words}: {listed(list(map(label_of, objects)), len(objects))}"
+            for objects, words in groups
+            if objects
+        ]
+        if not parts:
+            return
+        severity = Severity.WARNING if any(not is_said_to_count(obj) for obj in not_counted) else None
+        note = self.add(FindingCode.HIDDEN, container, what="; ".join(parts), severity=severity)
+        note.users.clear()
+        for obj in (*counted, *not_counted, *references):
+            note.users.setdefault(self.place(obj), label_of(obj))
 
     def empty(self, head: BomEntry) -> None:
         text = FindingCode.EMPTY_BOM.sentence.format(obj=head.label)

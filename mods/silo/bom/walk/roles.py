@@ -12,7 +12,10 @@ this very file: an *own part*, which is no item yet. How an object comes to brin
 * What shows others is counted; the others count where they lie only if they are visible there. The original
   of an array and the members of a compound never do.
 * What lies in something suppressed or excluded is left out with it.
-* What a cut, a boolean or a fusion consumes is no piece to buy, wherever that feature lies.
+* What a cut, a boolean or a fusion consumes is no piece to buy, wherever that feature lies; but what a saved
+  view shows is one.
+* A feature over linked parts is these parts, modified here: they count, once, and it is no part of its own.
+* A configured copy counts with its own contents, under its original and its values.
 * A broken link brings a :class:`Lost` component with its quantity, and a finding that blocks.
 
 Nothing here depends on where the assembly is used, so each is read once (:class:`Reader`).
@@ -24,37 +27,55 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
-from silo.bom.errors import DocumentError
+from silo.bom.errors import DocumentError, listed
 from silo.bom.findings import FindingCode
 from silo.bom.key import Key
-from silo.bom.walk.arrays import draft_count, elements, is_array, left_out_by
-from silo.bom.walk.contents import Contents, Contribution, Count, CountedObjects, Lost, ObjectRole, add
-from silo.bom.walk.document import LinkProblem, first_of, label_of, located, object_name, own, same_document
-from silo.bom.walk.identity import document_identity, identity_of, own_identity
+from silo.bom.walk.arrays import draft_count, draft_elements, elements, is_array, left_out_by
+from silo.bom.walk.contents import (
+    Contents,
+    Contribution,
+    Count,
+    CountedObjects,
+    Lost,
+    Modified,
+    ObjectRole,
+    add,
+)
+from silo.bom.walk.document import (
+    LinkProblem,
+    derived,
+    first_of,
+    label_of,
+    located,
+    own,
+    same_document,
+)
+from silo.bom.walk.facts import Facts, Files
+from silo.bom.walk.identity import identity_of, own_identity
 from silo.bom.walk.kinds import (
     COMPONENTS,
     INLINE,
     REPEATERS,
     Kind,
+    has_solid,
     is_named_assembly,
     kind_of,
-    no_component,
     sources,
 )
 from silo.bom.walk.notes import Notes
-from silo.bom.walk.operands import consumed
-from silo.bom.walk.standard import STANDARD_PARTS, designation
-from silo.bom.walk.survey import survey_of
+from silo.bom.walk.operands import Taking, guides, operands
+from silo.bom.walk.seen import is_said_to_count
+from silo.bom.walk.standard import STANDARD_PARTS
 from silo.bom.walk.targets import (
     Inspect,
     Target,
     is_assembly_link,
     is_link,
     own_parts,
-    resolve_target,
     stale_copies,
 )
-from silo.bom.walk.tree import Tree
+from silo.bom.walk.tree import Tree, is_switched_on
+from silo.bom.walk.variants import values_of
 
 # Groups that link to groups: no file needs many of these, but an attack does.
 _MAX_NESTING = 32
@@ -70,31 +91,7 @@ _GEOMETRY = REPEATERS | {Kind.LOCAL}
 _COUNTS = (ObjectRole.COMPONENT, ObjectRole.HOLDER)
 
 
-Canonical = Callable[[str], str]
-
-
-class Files:
-    """What identifies an object: its file, by one path, and its name in it."""
-
-    def __init__(self, canonical: Canonical | None = None) -> None:
-        self._canonical = canonical
-        self._paths: dict[str, str] = {}
-
-    def key(self, obj: Any) -> Key:
-        return (self.path(obj), object_name(obj))
-
-    def path(self, obj: Any) -> str:
-        return self.canonical(getattr(getattr(obj, "Document", None), "FileName", "") or "")
-
-    def canonical(self, path: str) -> str:
-        if not path or self._canonical is None:
-            return path
-        if path not in self._paths:
-            self._paths[path] = self._canonical(path)
-        return self._paths[path]
-
-
-class Reader:
+class Reader(Facts):
     """Reads assemblies, each once, and keeps what it learnt of the objects that it met on the way.
 
     beside
@@ -111,15 +108,11 @@ class Reader:
         beside: Callable[[Any], Iterable[Any]] = lambda _container: (),
         hardware: bool = True,
     ) -> None:
+        super().__init__(inspect, files)
         self.notes = Notes(files.path)
-        self.key = files.key
         self.beside = beside
         self.hardware = hardware
-        self._inspect = inspect
         self._known: dict[Key, Contents] = {}
-        self._not_components: dict[Key, str] = {}
-        self._designations: dict[Key, tuple[str, bool]] = {}
-        self._eaten: dict[str, dict[Key, Any]] = {}
 
     def contents(self, container: Any) -> Contents:
         """Read what an assembly holds, once for all its uses."""
@@ -139,57 +132,6 @@ class Reader:
             return Reading(self, obj).brought_by(obj)
         except DocumentError:
             return []
-
-    def resolve(self, link: Any) -> Target:
-        """Follow a link to its end."""
-        return resolve_target(link, self._inspect)
-
-    def eaten(self, document: Any, features: Iterable[Any]) -> dict[Key, Any]:
-        """Map the key of each object that the features of a document consume to the feature.
-
-        features
-            of a document that does not say which objects it has.
-        """
-        path = getattr(document, "FileName", "") or f"{id(document):x}"
-        if path not in self._eaten:
-            listed = [obj for obj, _ in survey_of(document).of({Kind.LOCAL})]
-            self._eaten[path] = consumed(listed or features, self.key)
-        return self._eaten[path]
-
-    def no_component(self, key: Key, target: Any) -> str:
-        """Return what the target is if it is no component; "" if it may be one."""
-        if key not in self._not_components:
-            self._not_components[key] = no_component(target)
-        return self._not_components[key]
-
-    def standard(self, obj: Any, key: Key | None = None) -> tuple[str, bool]:
-        """Return the designation of a standard part ("" for anything else), and if it has an item of its own.
-
-        It has one if somebody registered this very object. The identity of its document is that of the part
-        beside it, unless there is none.
-        """
-        key = key or self.key(obj)
-        known = self._designations.get(key)
-        if known is None:
-            text = designation(obj)
-            known = self._designations[key] = (text, bool(text) and _is_registered(obj))
-        return known
-
-    def component(self, obj: Any) -> Key:
-        """Return the identity of a component: the designation of a standard part, the key of any other."""
-        key = self.key(obj)
-        text, registered = self.standard(obj, key)
-        return (STANDARD_PARTS, text) if text and not registered else key
-
-
-def _is_registered(fastener: Any) -> bool:
-    if own_identity(fastener):
-        return True
-    document = getattr(fastener, "Document", None)
-    if not document_identity(document):
-        return False
-    others = (obj for obj in getattr(document, "Objects", ()) or () if obj is not fastener)
-    return all(kind_of(obj) in (Kind.NOTHING, Kind.FOLDER) for obj in others)
 
 
 class Reading:
@@ -218,6 +160,10 @@ class Reading:
         self._holds_components = False
         self._main: Tree | None = None
         self._hidden: list[Any] = []
+        self._hidden_counted: list[Any] = []
+        self._references: list[Any] = []
+        self._modified: list[Modified] = []
+        self._guides: set[Key] = set()
         # What was entered and not yet left, the assembly first; and the ways that led back into themselves.
         self._open: dict[Key, Any] = {}
         self._rings: list[dict[Key, Any]] = []
@@ -259,7 +205,12 @@ class Reading:
             if self._roles.get(count.shown.key) is not ObjectRole.COMPONENT:
                 self._notes.add(FindingCode.TWO_ROLES, count.shown.obj)
         holds = self._holds_components or bool(counts)
-        return Contents(counts, mine, self._roles, holds, is_part, self._hidden, tree)
+        contents = Contents(counts, mine, self._roles, holds, is_part, self._hidden, tree)
+        contents.hidden_counted, contents.references = self._hidden_counted, self._references
+        contents.modified = self._modified
+        if contents.is_assembly(container):
+            self._notes.hidden(container, self._hidden_counted, self._hidden, self._references)
+        return contents
 
     def _is_one_part(self, counts: list[Count]) -> bool:
         """Return True if the only component of a file is its only part: the file then is this part, and no
@@ -284,6 +235,7 @@ class Reading:
             tree = self._trees[key] = Tree(container, self._key, self._is_closed)
             self._find_wholes(tree, container)
             self._find_repeated(tree)
+            self._find_guides(tree)
         return tree
 
     def _is_closed(self, obj: Any, kind: Kind) -> bool:
@@ -361,6 +313,12 @@ class Reading:
                 covered = self._covered if tree.times(name) else self._gone
                 covered.update(map(self._key, sources(obj)))
 
+    def _find_guides(self, tree: Tree) -> None:
+        """Find the wires and points along which arrays and sweeps go; they are no parts."""
+        for obj, kind in tree.members.values():
+            if kind in (Kind.DRAFT_ARRAY, Kind.LOCAL):
+                self._guides.update(self._key(guide) for guide in guides(obj) if not has_solid(guide))
+
     def shown_by(self, objects: list[tuple[Any, Kind]]) -> set[Key]:
         """Return the objects of the document that these show, directly or not."""
         keys: set[Key] = set()
@@ -414,6 +372,7 @@ class Reading:
         # Few assemblies have anything covered or shown twice; to climb for each takes long in deep ones.
         around = (name, *tree.around(name)) if self._covered or self._shown else ()
         if not self._covered.isdisjoint(around):
+            self._report_covered(tree, name, obj)
             return ObjectRole.SOURCE, None
         if name in self._gone:
             return ObjectRole.LEFT_OUT, None
@@ -425,10 +384,92 @@ class Reading:
             return ObjectRole.HOLDER, None
         if any(outer in self._shown and not tree.visible(outer) for outer in around):
             return ObjectRole.SOURCE, None
+        if name in self._guides:
+            return ObjectRole.CONSTRUCTION, None
+        if kind in COMPONENTS and self._is_reference(tree, name, obj):
+            return ObjectRole.REFERENCE, None
         node = self._node(name, obj, kind)
         if node is None or not node.brings:
             return ObjectRole.CONSTRUCTION, None
+        if kind is Kind.LOCAL and node.shown_objects:
+            return self._modified_here(tree, name, node)
         return self._unconsumed(tree, name, node)
+
+    def _report_covered(self, tree: Tree, name: Key, obj: Any) -> None:
+        """Say that a visible original lies where an array or a compound shows it."""
+        if name not in self._covered or not tree.visible(name):
+            return
+        for other, kind in tree.members.values():
+            if kind in REPEATERS and any(source is obj for source in sources(other)):
+                self._notes.add(FindingCode.COINCIDENT, obj, target=other)
+                return
+
+    def _is_reference(self, tree: Tree, name: Key, link: Any) -> bool:
+        """Return True for a hidden link that only supports other geometry; the file may say otherwise."""
+        if tree.visible(name) or is_said_to_count(link) or not self._reader.supported_by(link):
+            return False
+        self._references.append(link)
+        self._holds_components = True
+        return True
+
+    def _is_piece(self, obj: Any) -> bool:
+        """Return True for an object that a saved view shows, whatever uses it."""
+        key = self._key(obj)
+        tree = self._main
+        is_seen = tree.visible(key) if tree is not None and key in tree.members else is_switched_on(obj)
+        return is_seen and self._reader.has_view(obj.Document)
+
+    def _linked_operands(self, feature: Any) -> list[Contribution]:
+        """Return the linked parts whose solids live on in a feature, directly or through other features."""
+        parts: dict[Key, Contribution] = {}
+        seen, further = {self._key(feature)}, [feature]
+        for taker in further:
+            inner = own(taker, "Group") or () if derived(taker, "PartDesign::Body") else ()
+            for operand in (operand for step in (taker, *inner) for operand in operands(step)):
+                key = self._key(operand.obj)
+                if operand.how is Taking.TOOL or key in seen or not self._is_mine(operand.obj):
+                    continue
+                seen.add(key)
+                kind = kind_of(operand.obj)
+                if kind is Kind.NOTHING or self._is_piece(operand.obj):
+                    continue
+                if kind is Kind.LOCAL and not self._is_declared(operand.obj):
+                    further.append(operand.obj)
+                elif (node := self._node(key, operand.obj, kind)) is not None and self._has_linked(node):
+                    parts[key] = node
+        return list(parts.values())
+
+    def _has_linked(self, node: Contribution) -> bool:
+        return any(
+            key[0] != STANDARD_PARTS and not (key[0] == self._path and self._is_own(target))
+            for key, (target, _) in node.brings.items()
+        )
+
+    def _modified_here(
+        self, tree: Tree, name: Key, node: Contribution
+    ) -> tuple[ObjectRole, Contribution | None]:
+        """Judge a feature over linked parts: they count at their own places; what lies elsewhere counts
+        here.
+        """
+        if self._consumer(tree, name) is not None:
+            return ObjectRole.OPERAND, None
+        parts = [part for part, _ in node.shown_objects]
+        names = sorted({label_of(part.obj) for part in parts})
+        self._notes.add(FindingCode.MODIFIED_HERE, node.obj, parts=listed(names, 8))
+        self._modified.append(Modified(node.obj, frozenset(part.key for part in parts)))
+        rest = [(part, 1) for part in parts if part.key not in tree.members]
+        if not rest:
+            return ObjectRole.MODIFIED, None
+        return ObjectRole.COMPONENT, Contribution(name, node.obj, node.kind, self._sum(rest), tuple(rest))
+
+    def _consumer(self, tree: Tree, name: Key) -> tuple[Any, Taking] | None:
+        features = (obj for obj, kind in tree.members.values() if kind is Kind.LOCAL)
+        eaten = self._reader.eaten(self._document, features)
+        if not eaten:
+            return None
+        owners = (name, *tree.above(name))
+        takers = (eaten.of(owner, lambda: tree.visible(name)) for owner in owners)
+        return next((taker for taker in takers if taker is not None), None)
 
     def _report_left_out(self, obj: Any, kind: Kind) -> None:
         """Report what is left out by itself; not what is left out with its container, or what nobody buys."""
@@ -444,11 +485,11 @@ class Reading:
             return ObjectRole.COMPONENT, node
         if len(tree.members) < 2 and not self._is_hardware(node):  # to ask every feature takes long
             return ObjectRole.COMPONENT, node
-        features = (obj for obj, kind in tree.members.values() if kind is Kind.LOCAL)
-        eaten = self._reader.eaten(self._document, features)
-        feature = next((eaten[owner] for owner in (name, *tree.above(name)) if owner in eaten), None)
-        if feature is None:
+        if (taker := self._consumer(tree, name)) is None:
             return ObjectRole.COMPONENT, node
+        feature, how = taker
+        if how is Taking.TOOL and derived(node.obj, "PartDesign::Body") and not tree.visible(name):
+            return ObjectRole.COMPONENT, node  # a device that cut its place, hidden: asked about as such
         if self._is_hardware(node):
             self._notes.add(FindingCode.CONSUMED, node.obj, target=feature)
         remaining = {
@@ -473,15 +514,19 @@ class Reading:
 
         hidden = set()
         for node, _ in leaves:
-            if node.kind not in DECLARABLE or tree.visible(node.key):
+            if node.kind not in DECLARABLE or tree.visible(node.key) or is_said_to_count(node.obj):
                 continue
             if all(key[0] == self._path and self._is_own(target) for key, (target, _) in node.brings.items()):
                 hidden.add(node.key)
-        if not hidden or len(hidden) == len(leaves):
-            return leaves
-        self._roles.update(dict.fromkeys(hidden, ObjectRole.CONSTRUCTION))
-        self._hidden += [tree.members[name][0] for name in hidden]
-        return [leaf for leaf in leaves if leaf[0].key not in hidden]
+        if len(hidden) == len(leaves):
+            hidden = set()
+        if tree is self._main:
+            self._roles.update(dict.fromkeys(hidden, ObjectRole.HIDDEN))
+            self._hidden += [obj for name, (obj, _) in tree.members.items() if name in hidden]
+            self._hidden_counted += [
+                node.obj for node, _ in leaves if node.key not in hidden and not tree.visible(node.key)
+            ]
+        return [leaf for leaf in leaves if leaf[0].key not in hidden] if hidden else leaves
 
     def _split(
         self, leaves: Iterable[tuple[Contribution, int]], *, beside: bool = False
@@ -547,6 +592,9 @@ class Reading:
         if kind is Kind.STANDARD:
             return Contribution(key, obj, kind, self._standard(obj))
         if kind is Kind.LOCAL or self._is_closed(obj, kind) or key in self._wholes:
+            if kind is Kind.LOCAL and not self._is_declared(obj) and (parts := self._linked_operands(obj)):
+                several = tuple((part, 1) for part in parts)
+                return Contribution(key, obj, kind, self._sum(several), several)
             return Contribution(key, obj, kind, {key: (obj, 1)})
         if kind is Kind.FOREIGN:
             return Contribution(key, obj, kind, self._imported(key, obj))
@@ -605,6 +653,11 @@ class Reading:
         if not brings or kind is not Kind.DRAFT_ARRAY:
             return Contribution(key, obj, kind, brings, tuple(shown_objects))
         count = draft_count(obj)
+        for element in draft_elements(obj):
+            self._is_left_out(element)
+        if count == 0:
+            self._holds_components = True
+            return Contribution(key, obj, kind, {})
         if count is None:
             self._notes.add(FindingCode.ARRAY_SIZE, obj, target=shown[0])
         elif not all(self._is_own(target) for target, _ in brings.values()):
@@ -664,8 +717,11 @@ class Reading:
             return Contribution(key, link, kind, {})
         # An object of another file is a component, whatever it is.
         text, _ = self._reader.standard(target.obj, name)
+        variant = self._reader.variant(target)
         if text:
             brings = self._standard(target.obj)
+        elif variant is not None:
+            brings = {variant.key: (variant.copy, 1)}
         else:
             brings = self._ones.setdefault(name, {name: (target.obj, 1)})
         if not brings:
@@ -687,24 +743,30 @@ class Reading:
 
     def _in_document(self, key: Key, link: Any, kind: Kind, target: Target) -> Contribution:
         """Return what a link within the file brings: the same as its target, which may be nothing."""
-        obj = target.obj
+        variant = self._reader.variant(target)
+        obj = target.obj if variant is None else variant.copy
         node = self._node(self._key(obj), obj, kind_of(obj))
         shown_objects = ((node, target.instances),) if node is not None and node.brings else ()
         if not shown_objects:
             if not any(key in ring for ring in self._rings):
                 self._notes.in_document(link, obj)
-        elif target.mirrored:
-            self._notes.add(FindingCode.MIRRORED, link, target=obj)
-        if shown_objects and target.variant is not None:
-            self._notes.add(FindingCode.VARIANT, link, target=obj)
+        else:
+            self._doubts(link, target)
         return Contribution(key, link, kind, self._sum(shown_objects), shown_objects)
 
     def _remarks(self, link: Any, target: Target) -> None:
-        if target.mirrored:
-            self._notes.add(FindingCode.MIRRORED, link, target=target.obj)
-        if target.variant is not None:
-            self._notes.add(FindingCode.VARIANT, link, target=target.obj)
+        self._doubts(link, target)
         if is_assembly_link(link):
             gone, new = stale_copies(link, target.obj, self._key)
             if gone or new:
                 self._notes.stale(link, target.obj, gone, new)
+
+    def _doubts(self, link: Any, target: Target) -> None:
+        """Note what makes a piece differ from its part: another hand, another size, other values."""
+        if target.mirrored:
+            self._notes.add(FindingCode.MIRRORED, link, target=target.obj)
+        if target.scaled:
+            self._notes.add(FindingCode.SCALED, link, target=target.obj)
+        if target.variant is not None:
+            values = values_of(target.configured, target.obj) or "with its values unchanged"
+            self._notes.add(FindingCode.VARIANT, link, target=target.obj, values=values)

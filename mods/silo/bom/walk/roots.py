@@ -16,6 +16,7 @@ from silo.bom.errors import InputError, SeveralAssembliesError
 from silo.bom.walk.arrays import elements, left_out_by
 from silo.bom.walk.contents import Contents, Lost, ObjectRole
 from silo.bom.walk.document import DocumentRoot, derived, first_of, label_of, object_name, own, same_document
+from silo.bom.walk.facts import Files
 from silo.bom.walk.kinds import (
     COMPONENTS,
     INLINE,
@@ -26,8 +27,9 @@ from silo.bom.walk.kinds import (
     kind_of,
     members,
 )
-from silo.bom.walk.operands import consumed
-from silo.bom.walk.roles import SHOWING, Files, Reader, Reading
+from silo.bom.walk.operands import Consumers
+from silo.bom.walk.roles import SHOWING, Reader, Reading
+from silo.bom.walk.seen import has_view
 from silo.bom.walk.survey import Survey, survey_of
 from silo.bom.walk.targets import Inspect, is_assembly_link
 from silo.bom.walk.tree import COPIES, climbed, is_switched_on
@@ -62,8 +64,8 @@ class _Lying:
     the survey: in a circle both would wait for the collector.
     """
 
-    def __init__(self, survey: Survey) -> None:
-        self.survey = survey
+    def __init__(self, document: Any, survey: Survey) -> None:
+        self.document, self.survey = document, survey
         kept = vars(survey)
         if "lying" not in kept:
             kept["lying"] = (*_holders(survey), dict[str, bool]())
@@ -98,9 +100,27 @@ class _Lying:
             is_switched_on(member) for member in (obj, *(outer for outer, _ in self.around(object_name(obj))))
         )
 
+    def consumers(self) -> Consumers[str]:
+        """Return who consumes the objects of the document."""
+        kept = vars(self.survey)
+        if "consumers" not in kept:
+            document = self.document
+            features = [obj for obj, _ in self.survey.of(_LOCAL)]
+            kept["consumers"] = Consumers(features, object_name, lambda: has_view(document))
+        eaten: Consumers[str] = kept["consumers"]
+        return eaten
+
+    def is_eaten(self, obj: Any) -> bool:
+        """Return True if a feature consumes an object."""
+        return self.consumers().of(object_name(obj), lambda: self.is_visible(obj)) is not None
+
     def loose(self, kinds: frozenset[Kind]) -> list[Any]:
         """Return the objects of these kinds that lie in no container."""
         return [obj for obj, _ in self.survey.of(kinds) if not self.is_inner(object_name(obj))]
+
+
+def _lying_in(document: Any) -> _Lying:
+    return _Lying(document, survey_of(document))
 
 
 def _holders(survey: Survey) -> tuple[dict[str, tuple[Any, Kind]], dict[str, tuple[str, ...]]]:
@@ -168,7 +188,7 @@ def find_assemblies(document: Any) -> list[Any]:
     """Return the top-level containers of a document, the likeliest assembly first (equal ones in document
     order).
     """
-    return [obj for _, obj in _candidates(_Lying(survey_of(document)))]
+    return [obj for _, obj in _candidates(_lying_in(document))]
 
 
 _Candidates = list[tuple[tuple[int, bool], Any]]
@@ -217,7 +237,7 @@ def choose_assembly(document: Any, name: str | None = None) -> Any:
     """
     if name is not None:
         return _named(document, name)
-    lying = _Lying(survey_of(document))
+    lying = _lying_in(document)
     candidates = _candidates(lying)
     likely = _likely(candidates)
     if len(likely) > 1 and candidates[0][0][0] < 2:
@@ -271,15 +291,14 @@ def _named(document: Any, name: str) -> Any:
 
 
 def _loose_bodies(lying: _Lying) -> list[Any]:
-    """Return the geometry in no container, Body or feature; only the visible geometry, if some is visible."""
+    """Return the geometry in no container, Body or feature."""
     loose = lying.loose(_LOCAL)
     if len(loose) > 1:  # to ask every feature costs more than all the rest
         inner = lying.survey.grouped(_LOCAL)
         loose = [obj for obj in loose if object_name(obj) not in inner]
     if len(loose) > 1:
-        eaten = consumed([obj for obj, _ in lying.survey.of(_LOCAL)], object_name)
-        loose = [obj for obj in loose if object_name(obj) not in eaten]
-    return [obj for obj in loose if lying.is_visible(obj)] or loose
+        loose = [obj for obj in loose if not lying.is_eaten(obj)]
+    return loose
 
 
 def loose_hardware(container: Any, reader: Reader, whole: Whole = as_it_is) -> list[Any]:
@@ -291,10 +310,11 @@ def loose_hardware(container: Any, reader: Reader, whole: Whole = as_it_is) -> l
     """
     if getattr(container, "is_document_root", False):
         return []
-    survey = survey_of(whole(container.Document))
+    document = whole(container.Document)
+    survey = survey_of(document)
     if not survey.has_python():
         return []
-    lying = _Lying(survey)
+    lying = _Lying(document, survey)
     visible = [obj for obj in lying.loose(frozenset({Kind.STANDARD})) if lying.is_visible(obj)]
     roles = _roles_beside(container, reader, lying, visible, {}) if visible else ()
     if not (loose := [obj for obj, role in roles if role is ObjectRole.LOOSE]):
@@ -309,10 +329,9 @@ def _roles_beside(
     """Yield the role that each of these objects, which lie in no container, has for the assembly ``top``."""
     survey = lying.survey
     shown = {name for _, name in Reading(reader, top).shown_by(survey.of(SHOWING))}
-    eaten = consumed([obj for obj, _ in survey.of(_LOCAL)], object_name)
     for obj in objects:
         name = object_name(obj)
-        if name in eaten:
+        if lying.is_eaten(obj):
             role = ObjectRole.OPERAND
         elif name in shown or (
             not lying.is_visible(obj)  # a visible array shows its elements once more
@@ -346,7 +365,7 @@ def seen_beside(top: Any, reader: Reader) -> list[Any]:
     """Return what FreeCAD shows of the document of ``top`` beside it: also geometry, which holds no
     component.
     """
-    lying = _Lying(survey_of(top.Document))
+    lying = _lying_in(top.Document)
     mine = {object_name(top), *(object_name(obj) for obj, _ in lying.around(object_name(top)))}
     loose = [
         obj
@@ -370,7 +389,7 @@ def fates(top: Any, contents: Contents, reader: Reader) -> dict[str, ObjectRole 
     roles[object_name(top)] = ObjectRole.HOLDER
     if not (others := list(survey.of(_BESIDE | {Kind.ELEMENT}, roles.keys()))):
         return roles
-    lying = _Lying(survey)
+    lying = _Lying(top.Document, survey)
     grouped = survey.grouped(_LOCAL)
     outside = {object_name(obj) for obj, _ in lying.around(object_name(top))}
     beside = []

@@ -13,7 +13,7 @@ def identity_findings(entries: Iterable[BomEntry]) -> tuple[Finding, ...]:
     """Find one UUID in two files ("copied identity"), or on two parts of one file ("shared identity")."""
     users: dict[str, dict[tuple[str, str], BomEntry]] = {}
     for entry in sorted(walk_entries(entries), key=lambda entry: entry.key):
-        if entry.silo_uuid:
+        if entry.silo_uuid and not (entry.variant and not entry.is_own_item):
             users.setdefault(entry.silo_uuid.lower(), {})[entry.key] = entry
     findings = []
     for uuid, components in users.items():

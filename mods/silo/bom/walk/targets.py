@@ -32,6 +32,8 @@ Inspect = Callable[[Any], "LinkProblem | None"]
 # A longer chain of links, or links inside the sub-names of links, is a loop or an attack.
 _MAX_HOPS = 256
 _MAX_NESTING = 16
+# A smaller change of a scale is rounding.
+_SAME_SIZE = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +62,10 @@ class Target(NamedTuple):
         the sub-element ("Face1") where the link is a reference to geometry, not a component.
     excluded
         the target, or a link on the way to it, is marked by SiloBomExclude.
+    scaled
+        a scale other than 1 makes the part larger or smaller.
+    configured
+        the link that shows the changed copy: it has the values that differ.
     """
 
     obj: Any
@@ -71,6 +77,8 @@ class Target(NamedTuple):
     problem: LinkProblem | None = None
     way: tuple[Step, ...] = ()
     by_link: bool = False
+    scaled: bool = False
+    configured: Any = None
 
 
 @dataclass(slots=True)
@@ -142,6 +150,28 @@ def is_mirrored(link: object, index: int | None = None) -> bool:
     return any(map(_negative, scales)) or any(map(_scaled_negative, elements(link)[index_range]))
 
 
+def is_scaled(link: object, index: int | None = None) -> bool:
+    """Return True if a scale makes the part, or an element of the array, larger or smaller."""
+    if _changes_size(own(link, "ScaleVector")) or _changes_size(own(link, "Scale")):
+        return True
+    if not is_array(link):
+        return False
+    some = slice(None) if index is None else slice(index, index + 1)
+    scales = (
+        *tuple(own(link, "ScaleList") or ())[some],
+        *(own(e, "ScaleVector") for e in elements(link)[some]),
+    )
+    return any(map(_changes_size, scales))
+
+
+def _changes_size(scale: Any) -> bool:
+    if isinstance(scale, int | float):
+        return abs(abs(scale) - 1) > _SAME_SIZE
+    parts = None if scale is None else _components(scale)
+    # FreeCAD takes a zero as 1, since it would flatten the part.
+    return parts is not None and any(part and abs(abs(part) - 1) > _SAME_SIZE for part in parts)
+
+
 def _scaled_negative(obj: object) -> bool:
     # FreeCAD keeps Scale and ScaleVector in step; a reader may know only one of them.
     vector, scale = own(obj, "ScaleVector"), own(obj, "Scale")
@@ -177,15 +207,20 @@ def _resolve(link: object, trail: _Trail) -> Target:
     index: int | None = None
     count, mirrored, excluded, element, by_link = 1, False, False, "", False
     variant: Any = None
+    configured: Any = None
+    scaled = False
     way: list[Step] = []
     while True:
         if is_link(current):
             count *= array_count(current) if index is None else 1
             mirrored ^= is_mirrored(current, index)
+            scaled = scaled or is_scaled(current, index)
         elif derived(current, "App::LinkElement"):
             mirrored ^= _scaled_negative(current)
+            scaled = scaled or is_scaled(current)
         elif not is_assembly_link(current):
-            return Target(current, count, mirrored, variant, excluded, element, None, tuple(way), by_link)
+            end = (current, count, mirrored, variant, excluded, element)
+            return Target(*end, None, tuple(way), by_link, scaled, configured)
         trail.hops -= 1
         if trail.hops < 0:
             raise _EndlessError
@@ -197,6 +232,7 @@ def _resolve(link: object, trail: _Trail) -> Target:
         if variant is None:
             way += hop.through
             by_link, variant = not hop.through, copy
+            configured = current if copy is not None else None
         current, index = hop.obj, hop.index
         element = element or hop.element
         excluded = excluded or is_excluded(current)
@@ -208,8 +244,10 @@ def _next_hop(link: Any, trail: _Trail) -> tuple[_Hop, Any]:
     source, copy = first_of(own(link, "LinkCopyOnChangeSource")), first_of(linked)
     if source is not None:
         # LinkedObject is then a changed local copy (facts §1.2): of a standard part another one.
-        if copy is None or copy is source or kind_of(copy) is Kind.STANDARD:
-            return _Hop(source if copy is None else copy), None
+        if copy is None:
+            return _Hop(None, problem=_deleted_copy(link)), None
+        if copy is source or kind_of(copy) is Kind.STANDARD:
+            return _Hop(copy), None
         return _Hop(source), copy
     if linked is None:
         return _Hop(None, problem=_no_target(link, trail.inspect)), None
@@ -220,6 +258,14 @@ def _next_hop(link: Any, trail: _Trail) -> tuple[_Hop, Any]:
     if _lost_its_source(link, linked):
         return _Hop(None, problem=_no_source(link, trail.inspect)), None
     return _Hop(linked), None
+
+
+def _deleted_copy(link: Any) -> LinkProblem:
+    """Return the problem of a link whose changed copy was deleted: FreeCAD shows nothing, not the original.
+
+    The link itself stands for what is missing.
+    """
+    return LinkProblem(FindingCode.DELETED_COPY, _file_of(link), object_name(link))
 
 
 def _lost_its_source(link: object, target: object) -> bool:

@@ -29,7 +29,7 @@ from silo.bom.errors import DocumentError, InputError, listed
 from silo.bom.findings import FindingCode
 from silo.bom.items.naming import display_name
 from silo.bom.key import Key
-from silo.bom.walk.arrays import elements, left_out_by
+from silo.bom.walk.arrays import draft_elements, elements, left_out_by
 from silo.bom.walk.contents import Contents, Contribution, Count, Lost
 from silo.bom.walk.document import LinkProblem, derived, first_of, label_of, object_name, own, relative
 from silo.bom.walk.kinds import REPEATERS, Kind, is_container, is_named_assembly, kind_of
@@ -274,7 +274,14 @@ class Walk:
             self._leaf(key, obj, bodies)
             return
         children: list[Child] = []
+        replaced = {key for modified in contents.modified for key in modified.operands}
+        for modified in contents.modified:
+            product = self._shape_of(modified.feature)
+            place = in_metres(self._holders_of(modified.feature, contents, moved))
+            children.append(Child(label_of(modified.feature), product, place))
         for count in (*contents.own, *contents.counts):
+            if replaced and self._is_inside(count, contents, replaced):
+                continue
             for end, copies, place in self._uses(obj, count, contents, moved):
                 if not isinstance(end, Lost) and derived(end, "Mesh::Feature"):
                     self._note(
@@ -284,6 +291,29 @@ class Walk:
                 product = self._lost(end) if isinstance(end, Lost) else self.product(end, copies)
                 children.append(Child(label_of(count.shown.obj), product, in_metres(place)))
         self.nodes[key] = Node(key, self._name(obj), tuple(children))
+
+    def _shape_of(self, feature: Any) -> str:
+        """Return the key of the product that is a feature's own shape."""
+        key = self._key(feature)
+        if not self._is_known(key):
+            self.documents.add(file_of(feature))
+            self._leaf(key, feature, [(feature, np.eye(4))])
+        return key
+
+    def _holders_of(self, feature: Any, contents: Contents, moved: dict[str, Floats]) -> Floats:
+        """Return (4, 4) from a feature's axes to those of the assembly."""
+        around = np.eye(4)
+        path = next(contents.tree.paths(self._reader.key(feature)), ()) if contents.tree is not None else ()
+        for holder in path:
+            around = around @ moved.get(object_name(holder), self.facts.placement(holder))
+        return around @ self.facts.placement(feature)
+
+    def _is_inside(self, count: Count, contents: Contents, operands: set[Key]) -> bool:
+        """Return True for a component whose solid lives on in a feature of the assembly."""
+        tree = contents.tree
+        if tree is None or count.beside:
+            return count.shown.key in operands
+        return not operands.isdisjoint((count.shown.key, *tree.above(count.shown.key)))
 
     def _moved(self, link: Any) -> dict[str, Floats]:
         """Map each member of the real assembly to the placement of its copy in a flexible AssemblyLink."""
@@ -317,6 +347,9 @@ class Walk:
         file = lost.file.replace("\\", "/")
         self.absent.add(file)
         stem = file.rpartition("/")[2].rpartition(".")[0]
+        if file in self.documents:  # it is there, and a changed copy in it was deleted
+            self.absent.discard(file)
+            return self._nothing(lost, "its changed copy was deleted", lost.label)
         return self._nothing(lost, f"its file {relative(file, self.base)} cannot be read", stem)
 
     def _is_known(self, key: str) -> bool:
@@ -381,6 +414,9 @@ class Walk:
         below = [inner for inner, _ in node.shown_objects if key in inner.brings]
         if not below:
             yield node.brings[key][0], None, outer
+        elif kind is Kind.LOCAL:  # made of linked parts: its shape is what is there, once
+            if key == next(iter(node.brings)):
+                yield obj, obj, outer
         elif node.tree is not None:
             for inner in below:
                 for path in node.tree.paths(inner.key):
@@ -417,8 +453,10 @@ class Walk:
             if not places:
                 words = f"the array “{label_of(obj)}” was saved without its placements; counted once"
                 self._note("not_counted", words)
-            for place in places or [np.eye(4)]:
-                yield from _moved_by(outer @ place, seen)
+            left_out = [bool(left_out_by(element)) for element in draft_elements(obj)]
+            for number, place in enumerate(places or [np.eye(4)]):
+                if number >= len(left_out) or not left_out[number]:
+                    yield from _moved_by(outer @ place, seen)
 
     def _linked(
         self, node: Contribution, key: Key, with_place: bool, moved: Floats | None

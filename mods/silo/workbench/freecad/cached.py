@@ -9,6 +9,7 @@ attributes are never its target's either (facts §1.1). One :class:`FactCache` s
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Callable
 from typing import Any
 
@@ -16,7 +17,9 @@ from silo.bom.findings import FindingCode
 from silo.bom.walk.document import LinkProblem
 
 # Attributes of an object that are no properties, and that a walk may ask for.
-_PLAIN = frozenset(("State", "ID", "dumpPropertyContent", "getLinkedObject", "isValid"))
+_PLAIN = frozenset(
+    ("State", "ID", "dumpPropertyContent", "getLinkedObject", "isValid", "getTypeIdOfProperty")
+)
 
 
 class FactCache:
@@ -26,13 +29,17 @@ class FactCache:
         True for a FreeCAD document object.
     imported
         gives the part in a file that A2plus imported into a document: (path of the document, the file).
+    has_window
+        True if the FreeCAD has a window, in which unsaved documents are seen.
     """
 
     def __init__(
         self,
         is_object: Callable[[Any], bool],
         imported: Callable[[str, str], Any] = lambda _owner, file: LinkProblem(FindingCode.BROKEN_LINK, file),
+        has_window: bool = False,
     ) -> None:
+        self.has_window = has_window
         self._is_object = is_object
         self.imported = imported
         self._objects: dict[Any, CachedObject] = {}
@@ -98,6 +105,11 @@ class CachedObject:
             answer = self._cache.derived[key] = bool(self.real.isDerivedFrom(type_name))
         return answer
 
+    def has_solid(self) -> bool | None:
+        """Return True if the shape holds a solid; None if the object has no shape of its own."""
+        shape = getattr(self.real, "Shape", None) if "Shape" in self.PropertiesList else None
+        return None if shape is None else bool(getattr(shape, "Solids", ()))
+
     def __repr__(self) -> str:
         return f"<{self.TypeId} {self.Name}>"
 
@@ -112,12 +124,20 @@ class CachedDocument:
         self.Label: str = real.Label
         self.FileName: str = real.FileName
         self._meta: dict[str, str] | None = None
+        self._has_view: bool | None = None
         self._objects: list[CachedObject] | None = None
 
     @property
     def ProgramVersion(self) -> str:
         """Return the FreeCAD that saved the document; "" while it is unsaved."""
         return self.real.getProgramVersion() or ""
+
+    @property
+    def has_view(self) -> bool:
+        """Return True if a FreeCAD with a window saved the document, or has it open and unsaved."""
+        if self._has_view is None:
+            self._has_view = _has_view(self.FileName) if self.FileName else self._cache.has_window
+        return self._has_view
 
     @property
     def Meta(self) -> dict[str, str]:
@@ -147,3 +167,12 @@ class CachedDocument:
     def getPropertyByName(self, name: str) -> Any:
         """Return a property of the document; AttributeError if there is none, as in FreeCAD."""
         return self.real.getPropertyByName(name)
+
+
+def _has_view(path: str) -> bool:
+    """Return True if a FreeCAD with a window saved a file."""
+    try:
+        with zipfile.ZipFile(path) as file:
+            return "GuiDocument.xml" in file.namelist()
+    except (OSError, zipfile.BadZipFile):
+        return False

@@ -103,7 +103,7 @@ def cached_document(document: Any) -> CachedDocument:
         library = library or Library()
         return library.imported(_Owner(owner), file)
 
-    return FactCache(host.is_object, imported).document(document)
+    return FactCache(host.is_object, imported, host.has_gui()).document(document)
 
 
 def extract_object(assembly_obj: Any, *, hardware: bool = True) -> Extraction:

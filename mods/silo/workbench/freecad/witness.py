@@ -147,8 +147,9 @@ class _Witness:
         return self._documents[path]
 
     def _object(self, entry: BomEntry) -> Any:
-        document = self._document(entry.doc_path)
-        return None if document is None or entry.missing else document.getObject(entry.object_name)
+        path, name = entry.copy if entry.variant else (entry.doc_path, entry.object_name)
+        document = self._document(path)
+        return None if document is None or entry.missing else document.getObject(name)
 
     def _account(self, obj: Any, head: BomEntry, lines: Sequence[BomEntry]) -> SolidCount:
         account = SolidCount(head.doc_path, head.object_name, head.label)
