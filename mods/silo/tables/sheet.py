@@ -26,6 +26,7 @@ from silo.workbook.encoding import STARTS
 from silo.workbook.read import read_workbook
 from silo.workbook.sheet import Grid, SheetRow
 
+_BRACKETS = " ()[]{}"
 Continues = Callable[[SheetRow, Columns, SheetRow], bool]
 """Says if the line below a heading belongs to it."""
 
@@ -270,7 +271,9 @@ def _joined(header: SheetRow, below: SheetRow, *, brackets: bool) -> SheetRow:
     filled = [next(filter(None, reversed(header.cells[: i + 1])), "") for i in range(len(header.cells))]
     filled += [filled[-1] if filled else ""] * (len(below.cells) - len(filled))
     cells = [
-        (f"{above} ({under})" if brackets else f"{above} {under}".strip()) if under.strip() else own
+        (f"{above} ({under.strip(_BRACKETS)})" if brackets else f"{above} {under}".strip())
+        if under.strip()
+        else own
         for above, own, under in zip_longest(filled, header.cells, below.cells, fillvalue="")
     ]
     return SheetRow(header.line, tuple(cells))
@@ -294,8 +297,8 @@ def _best_header(
                 here = (1, len(columns.at), -index)
                 if here > score and (len(columns.at) > 1 or single):
                     best, score = _Header(delimiter, index, 1, row, columns), here
-            elif pair := _two_lines(rows[index : index + 2], kind, given):
-                here = (0, len(pair[1].at), -index)
+            if pair := _two_lines(rows[index : index + 2], kind, given):
+                here = (int(kind.complete(columns.at.keys())), len(pair[1].at), -index)
                 if here > score:
                     best, score = _Header(delimiter, index, 2, *pair), here
     return best
@@ -304,16 +307,18 @@ def _best_header(
 def _two_lines(
     rows: Sequence[SheetRow], kind: TableKind, given: Assigned | None
 ) -> tuple[SheetRow, Columns] | None:
-    """Read two lines as one heading, if neither is one alone: "Part" over "Number" and "Name"."""
+    """Read two lines as one heading, if both say more than either: "Part" over "Number" and "Name"."""
     if len(rows) < 2 or any(parse_number(cell) for cell in rows[1].cells):
         return None
-    if kind.complete(find_columns(rows[1].cells, kind, given).at.keys()):
-        return None
+    first, second = (find_columns(row.cells, kind, given).at for row in rows)
+    if len(second) < 2 and kind.complete(first.keys()):
+        return None  # a row of the table
     header = _joined(rows[0], rows[1], brackets=False)
     alone = [cell if kind.role_of(cell) else under or cell for cell, under in zip_longest(
         header.cells, rows[1].cells, fillvalue="")]  # fmt: skip
     columns = find_columns(alone, kind, given)
-    return (SheetRow(header.line, tuple(alone)), columns) if kind.complete(columns.at.keys()) else None
+    is_more = len(columns.at) > max(len(first), len(second))
+    return (SheetRow(header.line, tuple(alone)), columns) if is_more and kind.complete(columns.at) else None
 
 
 def _near(tables: Iterable[tuple[str, Sequence[SheetRow]]], kind: TableKind) -> str:

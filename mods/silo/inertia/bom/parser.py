@@ -25,6 +25,7 @@ from silo.inertia.bom.structure import (
 from silo.inertia.bom.table import BomCode, BOMEntry, BomTable, BomWarning
 from silo.tables.clashes import find_clashes
 from silo.tables.sheet import Sheet, read_sheet
+from silo.tables.structure import position
 from silo.tables.totals import is_total
 from silo.tables.yes_no import empty_means_fitted, is_fitted
 from silo.workbook.sheet import SheetRow
@@ -152,10 +153,15 @@ def _entry(
         quantum_kg=mass.quantum_kg,
         overridden=mass.overridden,
         unsure=mass.ambiguous or bool(mass.doubt),
-        item=cell(row.cells, item_role) or cell(row.cells, Heading.FIND_NUMBER),
+        item=_item(cell(row.cells, item_role) or cell(row.cells, Heading.FIND_NUMBER)),
         level=level_of(cell(row.cells, Heading.LEVEL), item_role, row.line, name, warnings),
         line=row.line,
     )
+
+
+def _item(text: str) -> str:
+    """Write a position with commas as others do: 1,1 is 1.1."""
+    return position(text) or text if "," in text else text
 
 
 def _quantity(text: str, line: int, name: str, warnings: list[BomWarning]) -> float | None:
