@@ -33,6 +33,7 @@ from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import DocumentError, Exit, InputError, RemoteError, SiloError, counted, listed
 from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.items.naming import display_name
+from silo.bom.proposed_command import outside_commands, proposed
 from silo.bom.view.diff_rows import diff_json, diff_rows
 from silo.bom.view.folders import base_folder, project_folder, shorten
 from silo.bom.view.tree_json import entry_json, finding_json
@@ -269,7 +270,7 @@ STATUS_WORDS = {
     Status.UNCHANGED: "no change, nothing was sent",
     Status.DRY_RUN: "preview only, nothing was sent",
     Status.BLOCKED: "not synced: links are broken (see below; --allow-missing syncs anyway)",
-    Status.UNREGISTERED: "not synced: the assembly has no Silo part number (silo-mod register)",
+    Status.UNREGISTERED: "not synced: the assembly has no Silo part number",
     Status.FAILED: "not synced",
 }
 # What changed, by the field of the diff.
@@ -291,6 +292,21 @@ def cell(text: str) -> str:
     return re.sub(r"([\\\\`*_\[\]<>|~$#])|^(\d*)([-+.)=])", r"\2\\\1\3", text)
 
 
+def sentence_cell(text: str) -> str:
+    """Return a sentence of ours as Markdown: a command in backticks can be copied as it is."""
+
+    def escaped(part: str) -> str:
+        inner = part.strip()
+        begin = part.index(inner)
+        return f"{part[:begin]}{cell(inner)}{part[begin + len(inner) :]}" if inner else part
+
+    def code_kept(part: str) -> str:
+        pieces = re.split(r"(`[\w /.:~+-]+`)", part)
+        return "".join(piece if number % 2 else escaped(piece) for number, piece in enumerate(pieces))
+
+    return outside_commands(code_kept, text)
+
+
 @dataclass
 class RunSummary:
     """A run in numbers, and what it leaves to people.
@@ -306,6 +322,14 @@ class RunSummary:
         sentence → the files that it is about.
     causes
         sentence → what it has in common with others.
+    at_fault
+        sentence → the files that have to be repaired, though other files suffer as well.
+    unreadable
+        file → why it cannot be read.
+    changed
+        the assemblies that were sent, or would be.
+    held
+        the assemblies that were not synced, without those of the server's errors.
     moved
         (part, before, now), for files that carry on the identity of one that is gone.
     before
@@ -314,6 +338,8 @@ class RunSummary:
         time by stage.
     notes
         what concerns the whole run: its index, its server.
+    page
+        the HTML report of the run, which has all of it; "" if none is written.
     """
 
     base: str = ""
@@ -327,12 +353,17 @@ class RunSummary:
     errors: dict[str, list[str]] = field(default_factory=dict)
     warnings: dict[str, list[str]] = field(default_factory=dict)
     causes: dict[str, str] = field(default_factory=dict)
+    at_fault: dict[str, str] = field(default_factory=dict)
+    unreadable: dict[str, str] = field(default_factory=dict)
+    changed: list[str] = field(default_factory=list)
+    held: list[str] = field(default_factory=list)
     findings: dict[Finding, None] = field(default_factory=dict)
     unregistered: dict[tuple[str, str], str] = field(default_factory=dict)
     moved: list[tuple[str, str, str]] = field(default_factory=list)
     before: frozenset[str] | None = None
     seconds: dict[str, float] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    page: str = ""
 
     @property
     def exit_code(self) -> Exit:
@@ -357,6 +388,8 @@ class RunSummary:
             if outcome.status in (Status.MERGED, Status.DRY_RUN) and outcome.plan is not None:
                 diff = outcome.plan.diff
                 self.lines_changed += len(diff.added) + len(diff.quantity_changed)
+            if is_news(outcome) and outcome.error is None:
+                (self.changed if outcome.status in _FINE else self.held).append(_name_of(outcome))
             if outcome.error is not None:
                 self._fail(outcome.error, outcome.assembly.doc_path, 1)
             if outcome.status is Status.UNREGISTERED:
@@ -370,7 +403,9 @@ class RunSummary:
         if isinstance(error, RemoteError):
             self.unsent[str(error)] += count
         cause = error.reason if isinstance(error, DocumentError) else str(error)
-        self._note(self.errors, str(error), file, cause)
+        self._note(self.errors, str(error), file, cause, file)
+        if isinstance(error, DocumentError):
+            self.unreadable[self.at_fault[shorten(str(error), self.base)]] = cause
 
     def add_findings(self, findings: Iterable[Finding], top: str = "") -> None:
         """Count what was noticed; parts without a number have a list of their own."""
@@ -380,11 +415,12 @@ class RunSummary:
             self.findings.setdefault(finding)
             where = self.errors if finding.severity is Severity.ERROR else self.warnings
             place = finding.where[0].doc_path if finding.where else top
-            self._note(where, finding.message, place, finding.code.meaning)
+            self._note(where, finding.message, place, finding.code.meaning, finding.file or place)
 
-    def _note(self, where: dict[str, list[str]], message: str, file: str, cause: str) -> None:
+    def _note(self, where: dict[str, list[str]], message: str, file: str, cause: str, at_fault: str) -> None:
         message, file = shorten(message, self.base), shorten(file, self.base)
         self.causes[message] = cause
+        self.at_fault[message] = shorten(os.path.realpath(at_fault) if self.base else at_fault, self.base)
         files = where.setdefault(message, [])
         if file not in files:
             files.append(file)
@@ -444,40 +480,131 @@ class RunSummary:
         words += [f"{count} {status.replace('_', ' ')}" for status, count in sorted(self.statuses.items())]
         return f"{kept}{', '.join(words)}."
 
+    def mail(self) -> Iterator[tuple[str, list[str]]]:
+        """Yield what fits on one screen: a title, and its lines; a line for each cause, with three examples.
+
+        All of it is in :meth:`sections`.
+        """
+        told = self.told()
+        if self.before is not None:
+            new = [_first_ones(cause) for cause in self._by_cause(self._unknown())]
+            new += self._numberless(self.before)
+            yield "New since the last run", _most(new or ["nothing"])
+        yield "Errors", _most(map(_first_ones, self._by_cause(self.errors)))
+        yield "Warnings", _most(map(_first_ones, self._by_cause(self._warned(self.before or frozenset()))))
+        yield "Without a part number", self._numberless(frozenset()) if told else []
+        lists = (("Changed", self.changed), ("Not synced", self.held))
+        for title, names in lists:
+            yield title, [_examples(counted(len(names), "assembly", "assemblies"), names)] if names else []
+        moves = [f"{old} → {new}" for _name, old, new in self.moved]
+        yield "Moved", [_examples(counted(len(moves), "file"), moves)] if moves else []
+        more = [f"All of it: `{self.page}`" if self.page else "--report FILE.html has all of it"]
+        yield "Notes", [*self._notes(), *more]
+
     def sections(self) -> Iterator[tuple[str, list[tuple[str, list[str]]]]]:
         """Yield the sections below the line of counts: a title, and its lines, each with the lines below it.
 
-        Errors and warnings of one cause are one line. A hint about how something is modelled is only in the
-        first report.
+        Errors and warnings of one cause are one line, with a line for each file at fault. A hint about how
+        something is modelled is only in the first report.
         """
         before = self.before or frozenset()
         if self.before is not None:
-            yield "New since the last run", self._grouped(text for text in self.told() if text not in before)
-        yield "Errors", self._grouped(self.errors)
-        hint = FindingCode.CONSOLIDATION.meaning
-        old = {text for text in self.warnings if self.causes.get(text) == hint and text in before}
-        yield "Warnings", self._grouped(text for text in self.warnings if text not in old)
-        yield "Without a part number (silo-mod register)", [(line, []) for line in self._without_number()]
+            new = [_whole(cause) for cause in self._by_cause(self._unknown())]
+            new += [(line, []) for line in self._numberless(before)]
+            yield "New since the last run", new or [("nothing", [])]
+        yield "Errors", [_whole(cause) for cause in self._by_cause(self.errors)]
+        yield "Warnings", [_whole(cause) for cause in self._by_cause(self._warned(before))]
+        title = "Without a part number"
+        yield title, [(line, []) for line in (*self._without_number(), *self._numberless(frozenset())[:1])]
         yield "Moved", [(f"{name}: {old} → {new}", []) for name, old, new in self.moved]
+        yield "Notes", [(note, []) for note in self._notes()]
+
+    def _notes(self) -> list[str]:
         notes = list(self.notes)
-        if old:
-            notes.append(f"Hints that were there before: {len(old)} (silo-mod bom shows them).")
+        if old := len(self.warnings) - len(self._warned(self.before or frozenset())):
+            command = proposed("bom", Path(self.base or "."), "--verbose")
+            notes.append(f"Hints that were there before: {old} ({command} shows them).")
         if self.seconds:
             times = ", ".join(f"{stage} {seconds:.1f} s" for stage, seconds in self.seconds.items())
             notes.append(f"Time: {times}.")
-        yield "Notes", [(note, []) for note in notes]
+        return notes
 
-    def _grouped(self, sentences: Iterable[str]) -> list[tuple[str, list[str]]]:
-        """Put sentences of one cause together below a line for that cause."""
-        lines, groups = self.told(), dict[str, list[str]]()
+    def _unknown(self) -> list[str]:
+        """List the sentences about files that the last run did not have."""
+        before = self.before or frozenset()
+        return [words for words in (*self.errors, *self.warnings) if words not in before]
+
+    def _warned(self, before: frozenset[str]) -> list[str]:
+        """List the warnings, without hints about modelling that an earlier report had."""
+        hint = FindingCode.CONSOLIDATION.meaning
+        return [text for text in self.warnings if self.causes.get(text) != hint or text not in before]
+
+    def _numberless(self, before: frozenset[str]) -> list[str]:
+        """Say in one line how many parts have no part number, and what gives them one."""
+        lines = [line for line in self._without_number() if line not in before]
+        if not lines:
+            return []
+        command = f"; {proposed('register', Path(self.base))} gives them one" if self.base else ""
+        return [f"{_examples(counted(len(lines), 'part'), lines)}{command}"]
+
+    def _by_cause(self, sentences: Iterable[str]) -> list[Cause]:
+        """Put sentences of one cause together, and those about one file at fault below it.
+
+        A file that cannot be read itself is the cause of what its assemblies say of it.
+        """
+        lines = self.told()
+        groups: dict[str, dict[str, list[str]]] = {}
         for words in sentences:
-            groups.setdefault(self.causes.get(words, words), []).append(lines[words])
-        return [
-            (of[0], [])
-            if len(of) == 1
-            else (f"{len(of)} × {cause}", [group.replace(f": {cause}", "") for group in of])
-            for cause, of in groups.items()
-        ]
+            file = self.at_fault.get(words, words)
+            cause = self.unreadable.get(file) or self.causes.get(words, words)
+            groups.setdefault(cause, {}).setdefault(file, []).append(lines[words])
+        return [Cause(cause, files) for cause, files in groups.items()]
+
+
+@dataclass(frozen=True)
+class Cause:
+    """What several sentences of a run have in common; ``files``: file at fault → its sentences."""
+
+    words: str
+    files: Mapping[str, Sequence[str]]
+
+
+_EXAMPLES = 3
+_MOST_CAUSES = 12
+
+
+def _first_ones(cause: Cause) -> str:
+    """Write a cause in one line: its only sentence, or how many files are at fault, with three of them."""
+    (first, *others), *more = cause.files.values()
+    if not more:
+        return f"{first}{_more_places(others)}"
+    return _examples(f"{len(cause.files)} × {cause.words}", list(cause.files))
+
+
+def _more_places(others: Sequence[str]) -> str:
+    return f" ({counted(len(others), 'more place')})" if others else ""
+
+
+def _whole(cause: Cause) -> tuple[str, list[str]]:
+    """Write a cause as a line, and a line for each file at fault below it."""
+    ways = [
+        f"{first.replace(f': {cause.words}', '')}{_more_places(others)}"
+        for first, *others in cause.files.values()
+    ]
+    if len(ways) == 1:
+        return _first_ones(cause), []
+    return f"{len(ways)} × {cause.words}", ways
+
+
+def _examples(head: str, names: Sequence[str]) -> str:
+    return f"{head}: {listed(names, _EXAMPLES)}"
+
+
+def _most(lines: Iterable[str]) -> list[str]:
+    """Cut a list of lines, and say how many there are more."""
+    every = list(lines)
+    rest = len(every) - _MOST_CAUSES
+    return [*every[:_MOST_CAUSES], f"… and {counted(rest, 'more cause')}"] if rest > 1 else every
 
 
 class Form(Protocol):
@@ -492,6 +619,10 @@ class Form(Protocol):
     def end(self, summary: RunSummary | None) -> str:
         """Return the end of the report; ``summary`` is None until the run has ended."""
         ...
+
+    def body(self, summary: RunSummary, written: bytes) -> bytes:
+        """Return what the ended report keeps of the results between its beginning and its end."""
+        return written
 
 
 class ReportFile:
@@ -524,7 +655,8 @@ class ReportFile:
             if summary is not None:
                 self._file.seek(self._begin)
                 tail = self._file.read(self._end - self._begin)
-                whole = _bytes(self._form.head(summary)) + tail + _bytes(self._form.end(summary))
+                body = self._form.body(summary, tail)
+                whole = _bytes(self._form.head(summary)) + body + _bytes(self._form.end(summary))
                 if isinstance(self._file, BytesIO):
                     self._file = BytesIO(whole)
                 else:
@@ -583,12 +715,16 @@ def is_news(outcome: Outcome) -> bool:
     return outcome.status is not Status.UNCHANGED
 
 
+def _name_of(outcome: Outcome) -> str:
+    head = outcome.assembly
+    return " ".join(filter(None, (head.part_number, head.name))) or display_name(head) or head.object_name
+
+
 def _changes(outcome: Outcome, base: str) -> tuple[str, str, list[tuple[str, ...]], list[str]]:
     """Return what the report shows of an assembly: title, file, rows of changes, and why it was not
     synced.
     """
     head = outcome.assembly
-    who = " ".join(filter(None, (head.part_number, head.name))) or display_name(head) or head.object_name
     # Nothing changed in a BOM that was not sent.
     plan = outcome.plan if outcome.status not in _LEFT else None
     rows: list[tuple[str, ...]] = [
@@ -597,25 +733,27 @@ def _changes(outcome: Outcome, base: str) -> tuple[str, str, list[tuple[str, ...
         if kind in _CHANGES
     ]
     reasons = [shorten(reason, base) for reason in reasons_of(outcome)]
-    return f"{who}: {STATUS_WORDS[outcome.status]}", shorten(head.doc_path, base), rows, reasons
+    return f"{_name_of(outcome)}: {STATUS_WORDS[outcome.status]}", shorten(head.doc_path, base), rows, reasons
 
 
 _HEADINGS = ("", "Part number", "Name", "Quantity")
 _NOT_ENDED = "The run has not ended, or was stopped here."
 
 
-class Markdown:
-    """To read, and to attach to a job."""
+class Markdown(Form):
+    """A mail of one screen. A run in which few assemblies changed has their lines too."""
 
     def head(self, summary: RunSummary | None) -> str:
-        lines = ["# BOM sync", "", *([cell(summary.sentence()), ""] if summary is not None else [])]
-        for title, subtitle in summary.sections() if summary is not None else ():
-            if subtitle:
-                lines += [f"## {cell(title)}", ""]
-                for line, more in subtitle:
-                    lines += [f"- {cell(line)}", *(f"  - {cell(text)}" for text in more)]
-                lines.append("")
-        return "\n".join([*lines, "## Assemblies", ""])
+        lines = ["# BOM sync", "", *([sentence_cell(summary.sentence()), ""] if summary is not None else [])]
+        for title, lines_below in summary.mail() if summary is not None else ():
+            if lines_below:
+                lines += [f"## {cell(title)}", "", *(f"- {sentence_cell(line)}" for line in lines_below), ""]
+        if summary is None or _few(summary):
+            lines += ["## Assemblies", ""]
+        return "\n".join(lines)
+
+    def body(self, summary: RunSummary, written: bytes) -> bytes:
+        return written if _few(summary) else b""
 
     def one(self, result: TopResult, number: int) -> str:
         return "".join(
@@ -629,11 +767,21 @@ class Markdown:
             lines += [f"| {' | '.join(_HEADINGS)} |", "|---|---|---|---:|"]
             lines += [f"| {' | '.join(map(cell, row))} |" for row in rows]
             lines.append("")
-        lines += [f"- {cell(reason)}" for reason in reasons]
+        lines += [f"- {sentence_cell(reason)}" for reason in reasons]
         return "\n".join(lines).rstrip("\n") + "\n"
 
     def end(self, summary: RunSummary | None) -> str:
-        return f"\n*{_NOT_ENDED}*\n" if summary is None else "\nNothing else changed.\n"
+        if summary is None:
+            return f"\n*{_NOT_ENDED}*\n"
+        return "\nNothing else changed.\n" if _few(summary) else ""
+
+
+_FEW = 3
+
+
+def _few(summary: RunSummary) -> bool:
+    """Return True if a mail has room for each assembly that changed or was held."""
+    return len(summary.changed) + len(summary.held) <= _FEW
 
 
 _STYLE = """:root{color-scheme:light dark}
@@ -643,7 +791,7 @@ td,th{padding:.2rem .8rem .2rem 0;text-align:left;border-bottom:1px solid #8886}
 td:last-child,th:last-child{text-align:right}"""
 
 
-class Html:
+class Html(Form):
     """One page to read, in mail or in a browser."""
 
     def head(self, summary: RunSummary | None) -> str:
@@ -699,13 +847,15 @@ def reasons_of(outcome: Outcome) -> list[str]:
     """Return the reasons why an assembly was not synced."""
     if outcome.error is not None:
         return [str(outcome.error)]
+    if outcome.status is Status.UNREGISTERED:
+        return [f"{proposed('register', Path(outcome.assembly.doc_path))} gives it one"]
     return [finding.message for finding in blocking(outcome.resolved)] if outcome.status in _LEFT else []
 
 
 # --- for machines ---------------------------------------------------------------------------------------
 
 
-class Json:
+class Json(Form):
     """``{"results": […], "ended": true, "summary": {…}}``."""
 
     def head(self, summary: RunSummary | None) -> str:
@@ -722,7 +872,7 @@ class Json:
         return f'\n], "ended": true, "summary": {json.dumps(data)}}}\n'
 
 
-class JUnit:
+class JUnit(Form):
     """For CI: a test case per assembly, and per file that could not be read."""
 
     def head(self, summary: RunSummary | None) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import csv
 import os
+import shlex
 import shutil
 import zipfile
 from decimal import Decimal
@@ -18,6 +19,7 @@ from running_freecad import opened
 
 from silo.api.client import SiloClient
 from silo.bom.errors import BusyError
+from silo.bom.proposed_command import commands_in
 from silo.cli.setup.demo_edits import remove_from_assembly, set_element_count
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -376,7 +378,10 @@ def test_a_moved_file_is_suggested_and_relinked(run: Any, gearbox: Path) -> None
     finding = next(f for f in run("bom", gearbox, "--json").json()["findings"] if f["code"] == "missing_file")
     assert finding["did_you_mean"] == "hardware/Gear.FCStd"
     order = ("relink", gearbox, "--from", "parts/Gear.FCStd", "--to", "hardware/Gear.FCStd")
-    assert f"--from {order[3]} --to {order[5]}" in finding["message"]
+    lost = gearbox.parent / order[3]
+    (command,) = commands_in(finding["message"])
+    inner = gearbox.with_name("Gearbox.FCStd")
+    assert shlex.split(command)[1:] == ["relink", str(inner), "--from", str(lost), "--to", str(moved)]
     dry = run(*order, "--dry-run", "--json")
     assert dry.code == 0
     assert run("bom", gearbox).code == 1, "a dry run changes nothing"

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -69,8 +70,43 @@ def test_the_second_night_says_what_is_new(night: Any, gearbox: Path) -> None:
     assert [line for line in json.loads(second["json"])["summary"]["new"] if "new.FCStd" in line]
     assert "new: " in second["xml"]
     _, third = night("--dry-run")
-    assert "New since" not in third["md"] + third["html"]
+    for form in ("md", "html"):
+        assert "New since the last run" in third[form]
+        assert "nothing" in third[form].split("Errors")[0]
     assert "new.FCStd" in third["md"]
+
+
+def test_the_mail_of_a_night_fits_on_one_screen(
+    run: Any, registered: Path, silo: Any, gearbox: Path, tmp_path: Path
+) -> None:
+    """A line for each cause with three files at fault, however many say so; the page has the rest."""
+    vault = gearbox.parent
+    for number in range(40):
+        shutil.copy(gearbox, vault / f"Top{number}.FCStd")
+    parts = sorted((vault / "parts").glob("*.FCStd"))[:4]
+    for part_file in parts:
+        pointer(part_file)
+    for number in range(16):
+        pointer(vault / f"p{number}.FCStd")
+    names = [tmp_path / "night.md", tmp_path / "night.html"]
+    words = ("sync", vault, "--report", names[0], "--report", names[1])
+    terminal = run(*words).out
+    mail = names[0].read_text("utf-8")
+    assert len(mail.splitlines()) < 40
+    assert len(mail.encode()) < 4000
+    (pointers,) = [line for line in mail.splitlines() if "LFS pointer" in line]
+    assert pointers.startswith("- 20 × ")
+    assert pointers.count(".FCStd") == 3
+    assert f"All of it: `{names[1]}`" in mail
+    for line in filter(None, mail.splitlines()[2:]):
+        assert line.lstrip("# -").replace("\\", "").split("Time:")[0] in terminal
+    assert len(terminal.splitlines()) < 40
+    page = " ".join(Visible(names[1].read_text("utf-8")).text)
+    assert all(f"p{number}.FCStd" in page for number in range(16))
+    assert all(f"Top{number}.FCStd" in page for number in range(40))
+    again = run(*words).out
+    assert again.split("New since the last run\n")[1].split("\n")[0].strip() == "nothing"
+    assert len(run(*words, "--verbose").out.splitlines()) > 40
 
 
 def test_all_forms_say_the_same(night: Any, gearbox: Path) -> None:

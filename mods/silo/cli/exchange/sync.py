@@ -8,7 +8,7 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from silo.batch import SyncOptions, TopResult
 from silo.bom.errors import InputError
 from silo.cli.connection import client_of, reach
-from silo.cli.options import EACH
+from silo.cli.options import EACH, add_options
 from silo.cli.progress import count_steps, set_step
 from silo.cli.reading import reading_of, refuse_assembly_of
 from silo.files import documents_in
@@ -31,6 +31,7 @@ def add_sync(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "tops", metavar="TOP", nargs="+", help="assembly files, or folders: all assemblies below them"
     )
+    add_options(parser, {"--verbose": "each assembly that changes, and each file at fault"})
 
 
 def run_sync(args: argparse.Namespace) -> int:
@@ -58,6 +59,8 @@ def run_sync(args: argparse.Namespace) -> int:
             summary.notes += filter(None, [stack.enter_context(only_job(folder))])
         client = stack.enter_context(client_of(args, NIGHT, stop=stop))
         reports = [ReportFile(path) for path in args.report]
+        pages = [path for path in args.report if path.lower().endswith(".html")]
+        summary.page = os.path.realpath(pages[0]) if pages else ""
         shown = _Shown(args, many=len(tops) > 1)
         ended = None
         try:
@@ -108,7 +111,7 @@ def _results(
             reach(client)
         begin = time.monotonic()
         set_step("asking the server")
-        progress = count_steps(len({node.top for node in plan.nodes.values()}))
+        progress = count_steps(len(plan.errors) + len({node.top for node in plan.nodes.values()}))
         for result in SyncJob(plan, reading, client, options, summary.base, stop).results():
             progress(result.top)
             yield result
@@ -132,6 +135,7 @@ class _Shown:
         from silo.batch import Json
 
         self._json, self._many, self._count = Json() if args.json else None, many, 0
+        self._verbose: bool = args.verbose
         if self._json is not None:
             print(self._json.head(None), end="")
 
@@ -139,14 +143,14 @@ class _Shown:
         if self._json is not None:
             print(self._json.one(result, self._count), end="")
             self._count += 1
-        else:
+        elif self._verbose or not self._many:
             _show(result, whole=not self._many)
 
     def close(self, summary: RunSummary | None) -> None:
         if self._json is not None:
             print(self._json.end(summary), end="")
         elif summary is not None and self._many:
-            _show_summary(summary)
+            _show_summary(summary, whole=self._verbose)
 
 
 def _show(result: TopResult, *, whole: bool) -> None:
@@ -175,18 +179,22 @@ def _show(result: TopResult, *, whole: bool) -> None:
         out.print(findings_text(result.findings, result.base))
 
 
-def _show_summary(summary: RunSummary) -> None:
+def _show_summary(summary: RunSummary, *, whole: bool) -> None:
+    """Show the counts and what is left to people, on one screen; ``whole``: each file at fault."""
     from silo.cli.terminal import console, plain
 
     out = console()
-    out.print(f"\n{plain(summary.sentence())}", markup=False)
-    for title, lines in summary.sections():
+    out.print(plain(summary.sentence()), markup=False, soft_wrap=True)
+    mail: Iterable[tuple[str, list[tuple[str, list[str]]]]] = (
+        (title, [(line, []) for line in lines]) for title, lines in summary.mail()
+    )
+    for title, lines in summary.sections() if whole else mail:
         if lines:
             out.print(f"\n{title}", style=_STYLES.get(title, ""))
         for line, more in lines:
-            out.print(f"  {plain(line)}", markup=False)
+            out.print(f"  {plain(line)}", markup=False, soft_wrap=True)
             for text in more:
-                out.print(f"    {plain(text)}", markup=False)
+                out.print(f"    {plain(text)}", markup=False, soft_wrap=True)
 
 
 _STYLES = {"New since the last run": "bold", "Moved": "cyan", "Warnings": "yellow", "Errors": "bold red"}

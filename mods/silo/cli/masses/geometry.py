@@ -53,7 +53,6 @@ def _progress(name: str) -> Iterator[Any]:
     bar = Progress(
         TextColumn("{task.fields[file]}: {task.description}"),
         BarColumn(),
-        TextColumn("{task.completed}/{task.total}"),
         TimeElapsedColumn(),
         console=Console(stderr=True),
         transient=True,
@@ -62,8 +61,6 @@ def _progress(name: str) -> Iterator[Any]:
         task = bar.add_task("reading", total=None, file=name)
 
         def told(progress: Any) -> None:
-            bar.update(
-                task, description=progress.stage, completed=progress.done, total=progress.total or None
-            )
+            bar.update(task, description=str(progress), completed=progress.done, total=progress.total or None)
 
         yield told
