@@ -90,7 +90,7 @@ class Reply:
     def next(self) -> dict[str, str]:
         """Return the parameters of the next page that the answer names; {} if it names none."""
         data = self.data()
-        links = re.search(r'<([^>]*)>;[^,]*rel="?next\b', self.headers.get("Link", ""))
+        links = re.search(r'<([^<>]*)>;[^,<]*rel="?next\b', self.headers.get("Link", ""))
         address = links[1] if links else data.get("next") if isinstance(data, dict) else None
         return dict(parse_qsl(urlsplit(address).query)) if isinstance(address, str) else {}
 

@@ -134,7 +134,8 @@ class Sentences:
         for _number, parts, pattern in sorted(chain.from_iterable(self._patterns.get(w, ()) for w in words)):
             if all(map(text.__contains__, parts)) and (found := self._match(parts, pattern, text, whole)):
                 return re.sub(r"\{\w+\}", lambda place: found[place[0]], self._catalogue[pattern])
-        before, core = re.findall(r"^([^\w{\[-]*)(.*?)\s*$", text)[0]
+        rest = re.sub(r"^[^\w{\[-]+", "", text)
+        before, core = text[: len(text) - len(rest)], rest.rstrip()
         if core != text:
             return f"{before}{self(core, whole)}{text[len(before) + len(core) :]}" if core else text
         for between in ("  ", ". ", "; ", ": ", " (", ", "):

@@ -166,8 +166,8 @@ _ALIASES: dict[Heading, str] = {
 
 _LONGEST = 500  # characters: what follows is no heading
 
-BRACKET = re.compile(r"[\(\[（【<]\s*([^)\]）】>]*)\s*[\)\]）】>]")
-"""A remark in brackets, a unit more often than not: its first group is what stands in them."""
+BRACKET = re.compile(r"[\(\[（【<]([^(\[（【<)\]）】>]*+)[\)\]）】>]")
+"""A remark in brackets, a unit more often than not: its first group is what stands inside, with spaces."""
 
 
 def normal(header: str) -> str:

@@ -43,7 +43,7 @@ _PLAIN = re.compile(
     rb'[^"&]+" type="App::Property(?:String"[^<]*<String value="([^"<&\r\n\t]*)"/>'
     rb'|Map"[^<]*<Map count="0">\s*</Map>)' + _AFTER
 )
-_CHILD = re.compile(r"<(\w+)([^<]*)/>")
+_CHILD = re.compile(r"<(\w++)([^<]*)/>")
 _ATTRIBUTE = re.compile(r' ([\w:.-]+)="([^"]*)"')
 
 # Kept when an element is cut; any other property is cut out again when somebody asks for it. The pieces of

@@ -22,7 +22,7 @@ LOST = "\ufffd"
 
 _SEPARATORS = re.compile(r"[\s_\-‐‑–]+")
 
-_OCCURRENCE = re.compile(r"(?:\s*<\d+>|\s+\(\d+\)|:\d+)$")
+_OCCURRENCE = re.compile(r"(?:(?<!\s)(?:\s*+<\d++>|\s++\(\d++\))|:\d++)$")
 
 _LOST_RUN = re.compile(rf"[?{LOST}]+")
 

@@ -29,6 +29,9 @@ from silo.inertia.rigid import MassProps
 
 MAX_BYTES = 64 * 1024 * 1024
 
+# From its first character to its end; a quoted ">" is no end.
+_TAG = re.compile(rb"<(?:\"[^\"]*\"|'[^']*'|[^>\"'])*>")
+
 
 @dataclass(eq=False)
 class _Span:
@@ -309,7 +312,7 @@ class Urdf:
         """Find the end of the tag that begins at ``start``, and if it closes itself. A quoted ">" is no
         end.
         """
-        match = re.compile(rb"<(?:\"[^\"]*\"|'[^']*'|[^>\"'])*>").match(self.data, start)
+        match = _TAG.match(self.data, start)
         if match is None:
             raise InputError(f"{self.source}: a tag at byte {start} has no end")
         return match.end(), match[0].endswith(b"/>")

@@ -53,7 +53,7 @@ _MONTH = (
 )
 
 _NO_TEXT = re.compile(
-    r"'*(?:(?=\D*\d)[-+\d.,:/%$€ ]+(?:e[-+]?\d+)?(?: ?[ap]m?)?"
+    r"'*+(?:(?=\D*\d)[-+\d.,:/%$€ ]++(?:e[-+]?\d+)?(?: ?[ap]m?)?"
     rf"|\d{{1,4}}[-./ ]*{_MONTH}[-./ \d]*|{_MONTH}[-./ ]*\d{{1,4}}"
     r"|true|false|wahr|falsch|vrai|faux)",
     re.IGNORECASE,

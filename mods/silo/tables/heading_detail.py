@@ -131,7 +131,7 @@ def quantity_unit(cell: str) -> str:
     words.
     """
     for inside in BRACKET.findall(cell[:LONGEST_HEADING]):
-        unit = known_unit(inside)
+        unit = known_unit(inside.strip())
         if unit is not None and unit.kind is not UnitKind.PIECES:
             return unit.symbol
     return ""

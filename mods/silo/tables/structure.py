@@ -55,7 +55,7 @@ def position(text: str) -> str:
     plain = text.strip().rstrip(".").replace(",", ".")
     if not _POSITION.fullmatch(plain):
         return ""
-    return re.sub(r"(?:\.0+)+$", "", plain)
+    return re.sub(r"(?:\.0{1,6}){1,31}$", "", plain)
 
 
 def level(text: str) -> int | None:

@@ -8,7 +8,7 @@ import re
 from datetime import datetime, timedelta
 
 _TOKEN = re.compile(
-    r'"(?P<quoted>[^"]*)"|\\(?P<escaped>.)|\[\$(?P<money>[^\]-]*)[^\]]*\]|_.|\*.|\[[^\]]*\]'
+    r'"(?P<quoted>[^"]{0,255}+)"|\\(?P<escaped>.)|\[\$(?P<money>[^\]-]{0,255}+)[^\]]{0,255}+\]|_.|\*.|\[[^\]]{0,255}+\]'
     r"|(?P<digits>[#0?.,]+(?:E[+-]?[#0?]+)?)|(?P<other>.)",
     re.DOTALL,
 )

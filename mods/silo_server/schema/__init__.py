@@ -72,7 +72,7 @@ class PropertyField:
         if self.pattern and not re.fullmatch(self.pattern, text):
             example = f" such as {self.example}" if self.example else ""
             raise RejectedError(f"{self.label}: wanted a value{example}, got {text!r}")
-        if self.type == "link" and not re.fullmatch(r"https?://[^\s/]+\S*", text):
+        if self.type == "link" and not re.fullmatch(r"https?://[^\s/]\S*+", text):
             raise RejectedError(f"{self.label}: wanted a web address (https://…), got {text!r}")
         return text
 

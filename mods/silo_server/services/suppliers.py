@@ -258,7 +258,7 @@ class _Reader:
                 problem = f"wanted at most {longest} characters, got {len(row[name])}"
             if problem:
                 problems.append(f"{COLUMNS[name]}: {problem}")
-        if row["link"] and not re.fullmatch(r"https?://[^\s/]+\S*", row["link"]):
+        if row["link"] and not re.fullmatch(r"https?://[^\s/]\S*+", row["link"]):
             problems.append(f"Link: wanted a web address (https://…), got {row['link'][:40]!r}")
         prices: dict[Decimal, Decimal] = {}
         for written in filter(None, map(str.strip, re.split("[;\n]", row["prices"]))):

@@ -56,8 +56,8 @@ _EMPTY = {
 def is_empty(cell: str) -> bool:
     """Return True if a cell says "nothing": empty, "No value", "- None -", and their translations."""
     text = unicodedata.normalize("NFKC", cell).strip().casefold()
-    inner = re.fullmatch(r"[-–—<]\s*(.*?)\s*[-–—>]", text)
-    return text in _EMPTY or (inner is not None and inner[1] in _EMPTY)
+    framed = len(text) > 1 and text[0] in "-–—<" and text[-1] in "-–—>"
+    return text in _EMPTY or (framed and text[1:-1].strip() in _EMPTY)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,14 +96,14 @@ _CELL = re.compile(
 )
 
 _PER_PIECE = re.compile(
-    r"\s*(?:\b(?:per|pro|par)\b\s*|/\s*)?\b(?:each|ea|pcs?|pieces?|stk|stück|unit)\.?$", re.IGNORECASE
+    r"(?<!\s)\s*+(?:\b(?:per|pro|par)\b\s*|/\s*)?\b(?:each|ea|pcs?|pieces?|stk|stück|unit)\.?$", re.IGNORECASE
 )
 
-_TWO_UNITS = re.compile(r"([\d.,]+)\s*([^\W\d_]+)\.?[\s,]*([\d.,]+)\s*([^\W\d_]+)\.?")
+_TWO_UNITS = re.compile(r"([\d.,]++)\s*+([^\W\d_]++)\.?+[\s,]*+([\d.][\d.,]*+)\s*+([^\W\d_]++)\.?")
 
-_UNIT_FIRST = re.compile(r"(?P<unit>[^\W\d_]{2,}|[^\W\d_](?=[\s.]))\.?\s*(?P<number>[\d.,].*)")
+_UNIT_FIRST = re.compile(r"(?P<unit>[^\W\d_]{2,}+|[^\W\d_](?=[\s.]))\.?\s*(?P<number>[\d.,].*)")
 
-_TOLERANCE = re.compile(r"(?P<mass>.+?)\s*(?:±|\+/-|\+-)\s*(?P<by>[\d.,]+)\s*(?P<unit>[^\d\s]*)")
+_TOLERANCE = re.compile(r"(?P<mass>.+?)(?<!\s)\s*+(?:±|\+/-|\+-)\s*+(?P<by>[\d.,]++)\s*+(?P<unit>[^\d\s]*+)")
 
 _ERROR = re.compile(r"#[^\W\d]|Err:\d")
 

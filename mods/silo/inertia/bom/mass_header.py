@@ -34,7 +34,7 @@ _CLEAR_UNITS = {"kg", "kgs", "mg", "lb", "lbs", "lbm", "oz"}
 
 _WORD = re.compile(r"[/%]|[^\W_]+|[×∑]")
 
-_BRACKETS = re.compile(r"[\(\[（【<{]([^)\]）】>}]*)[\)\]）】>}]")
+_BRACKETS = re.compile(r"[\(\[（【<{]([^(\[（【<{)\]）】>}]*+)[\)\]）】>}]")
 
 _CAMEL = re.compile(r"(?<=[a-z])(?=[A-Z][a-z])|(?<=[Σ∑])(?=\w)")
 

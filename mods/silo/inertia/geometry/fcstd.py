@@ -152,9 +152,9 @@ def located(shape: Any, matrix: np.ndarray) -> Any:
 MAX_ENTRY_BYTES = 1_000_000_000
 
 _PLACEMENT = re.compile(rb"<PropertyPlacement\s([^>]*)>")
-_ATTRIBUTE = re.compile(rb"""([A-Za-z0-9]+)\s*=\s*["']([^"']*)["']""")
-_FILE = re.compile(rb"""<(?:Part|PlacementList|VectorList)\s[^>]*?file\s*=\s*["']([^"']+)["']""")
-_UUID = re.compile(rb"""<PropertyMaterial\s[^>]*?uuid\s*=\s*["']([0-9A-Fa-f-]+)["']""")
+_ATTRIBUTE = re.compile(rb"""(?<![A-Za-z0-9])([A-Za-z0-9]++)\s*+=\s*+["']([^"']*+)["']""")
+_FILE = re.compile(rb"""<(?:Part|PlacementList|VectorList)\s[^<>]*?file\s*=\s*["']([^"']+)["']""")
+_UUID = re.compile(rb"""<PropertyMaterial\s[^<>]*?uuid\s*=\s*["']([0-9A-Fa-f-]+)["']""")
 
 
 @dataclass(frozen=True, slots=True)

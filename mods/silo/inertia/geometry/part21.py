@@ -49,7 +49,7 @@ Value: TypeAlias = "EntityRef | Typed | str | float | tuple[Value, ...] | None"
 MAX_DEPTH = 60
 MAX_ENTITY_BYTES = 4_000_000
 
-_ENTITY = re.compile(rb"#(\d+)\s*=\s*([A-Z_0-9]*)\s*\(")
+_ENTITY = re.compile(rb"#(\d++)\s*+=\s*+([A-Z_0-9]*+)\s*+\(")
 _COMPLEX = re.compile(rb"UNIT|REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION|SOLID_MODEL")
 _BODY = re.compile(rb"(?:[^';]+|'[^']*')*")
 _REFERENCE = re.compile(rb"'(?:[^']|'')*'|#(\d+)")

@@ -133,7 +133,7 @@ MARK = "silo-mod:group:"
 
 _REFERENCE = re.compile(rb"'(?:[^']|'')*'|#(\d+)")
 _TIED = re.compile(
-    rb"(?<![A-Z_])REPRESENTATION_RELATIONSHIP\s*\((?:'(?:[^']|'')*'|[\s,$])*#(\d+)\s*,\s*#(\d+)"
+    rb"(?<![A-Z_])REPRESENTATION_RELATIONSHIP\s*+\((?:'(?:[^']++|'')*+'|[\s,$])*+#(\d++)\s*+,\s*+#(\d++)"
 )
 _MOVED = re.compile(rb"REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION\s*\(\s*#(\d+)")
 _DATA_END = re.compile(rb"ENDSEC\s*;\s*END-ISO-10303-21")

@@ -22,13 +22,15 @@ from silo.inertia.materials.material import Material
 
 MAX_CARD_BYTES = 1_000_000
 
-_CARD_NAME = re.compile(r"^\s*Name\s*[:=]\s*[\"']?(.+?)[\"']?\s*$", re.MULTILINE)
+_CARD_NAME = re.compile(r"^[ \t]*+Name[ \t]*+[:=][ \t]*+(.+)$", re.MULTILINE)
 
-_CARD_DENSITY = re.compile(r"^\s*Density\s*[:=]\s*[\"']?([^\"'\n]+?)[\"']?\s*$", re.MULTILINE)
+_CARD_DENSITY = re.compile(r"^[ \t]*+Density[ \t]*+[:=][ \t]*+(.+)$", re.MULTILINE)
 
 _UUID = re.compile(r"UUID\s*[:=]\s*[\"']?([0-9a-fA-F-]{36})")
 
-_INHERITS = re.compile(r"^Inherits:\s*\n(?:\s+.*\n)*?\s+UUID:\s*[\"']?([0-9a-fA-F-]{36})", re.MULTILINE)
+_INHERITS = re.compile(
+    r"^Inherits:[ \t\r]*+\n(?:(?:[ \t][^\n]*)?\n)*?[ \t]++UUID:[ \t]*+[\"']?([0-9a-fA-F-]{36})", re.MULTILINE
+)
 
 
 @dataclass(frozen=True)
@@ -103,13 +105,17 @@ def cards_in(folders: Iterable[Path]) -> list[Card]:
         by_uuid.setdefault(uuid, text)
     return [
         Card(
-            name[1] if (name := _CARD_NAME.search(text)) else None,
+            _unquoted(name[1]) if (name := _CARD_NAME.search(text)) else None,
             _card_density(text, by_uuid, 0),
             uuid,
             path,
         )
         for path, text, uuid in texts
     ]
+
+
+def _unquoted(value: str) -> str:
+    return value.strip().removeprefix('"').removeprefix("'").removesuffix('"').removesuffix("'")
 
 
 def _texts(folder: Path) -> Iterator[tuple[Path, str]]:
@@ -129,7 +135,7 @@ def _own_uuid(text: str) -> str:
 def _card_density(text: str, by_uuid: Mapping[str, str], depth: int) -> float | None:
     own = _CARD_DENSITY.search(text)
     if own is not None:
-        return parse_density(own[1])
+        return parse_density(_unquoted(own[1]))
     parent = _INHERITS.search(text)
     above = by_uuid.get(parent[1].casefold()) if parent is not None and depth < 8 else None
     return _card_density(above, by_uuid, depth + 1) if above is not None else None

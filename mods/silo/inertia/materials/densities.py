@@ -24,7 +24,7 @@ UNIT_NEEDED_BELOW = 25.0
 _VOLUMES = {"m": 1.0, "dm": 1e-3, "cm": 1e-6, "mm": 1e-9, "in": 0.0254**3, "ft": 0.3048**3, "l": 1e-3}
 
 _SHAPE = re.compile(
-    r"(?P<number>[^a-zµ]+(?:e[+-]?\d+)?)\s*(?P<mass>[a-zµ]+)\s*/\s*(?P<volume>[a-z]+)\s*\^?\s*3?"
+    r"(?P<number>[^a-zµ]++(?:e[+-]?\d++)?)\s*+(?P<mass>[a-zµ]++)\s*+/\s*+(?P<volume>[a-z]++)\s*+\^?\s*+3?"
 )
 
 

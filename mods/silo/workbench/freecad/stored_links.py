@@ -16,7 +16,7 @@ from xml.sax.saxutils import unescape
 # <XLink file="parts/b.FCStd" stamp="…" name="Box" …>, written by FreeCAD itself into memory just now.
 _XLINK = re.compile(r"<XLink\b([^>]*)>")
 
-_ATTRIBUTE = re.compile(r'(\w+)="([^"]*)"')
+_ATTRIBUTE = re.compile(r'\b(\w++)="([^"]*+)"')
 
 _ENTITIES = {"&quot;": '"', "&apos;": "'", "&#10;": "\n", "&#13;": "\r", "&#9;": "\t"}
 
