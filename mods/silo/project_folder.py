@@ -46,6 +46,8 @@ class FileRecord:
         when the record was written here, in seconds since 1970: what was committed later is made from it.
     item
         True if the document is that of an item; a file that no longer has the identity is another document.
+    former
+        the document that the file was before, until the first revision of this one has arrived.
     """
 
     document: str
@@ -56,6 +58,7 @@ class FileRecord:
     created: str = ""
     since: float = 0.0
     item: bool = False
+    former: str = ""
 
     @classmethod
     def of(cls, values: object) -> FileRecord | None:

@@ -36,6 +36,7 @@ from silo.api.wire import (
     Document,
     HeldItem,
     Item,
+    KnownContent,
     LastSync,
     MergeEvent,
     MergeRequest,
@@ -85,6 +86,7 @@ class Stored:
     revisions: list[Revision] = field(default_factory=list)
     files: dict[int, bytes] = field(default_factory=dict)
     held: list[HeldItem] = field(default_factory=list)  # what is in its newest file
+    became: str = ""  # the document that its file is now
     lines: list[dict[str, Any]] = field(default_factory=list)
 
     @property
@@ -274,6 +276,10 @@ class FakeStore:
         if content is not None:
             stored.files[revision.revision_number] = content
             stored.held = list((origin.items if origin else None) or ())
+            former = origin.former.lower() if origin else ""
+            stored.became = ""
+            if former and former != stored.item.id.lower() and (before := self._files().get(former)):
+                before.became = stored.item.id
         stored.item = stored.item.model_copy(
             update={"current_revision": revision.revision_number, "properties": dict(all_properties)}
         )
@@ -658,6 +664,28 @@ class FakeSilo(FakeStore):
         files, wanted = self._files(), [uuid.lower() for uuid in uuids]
         documents = [self._document_of(files[uuid]) for uuid in wanted if uuid in files]
         return {document.id: document for document in documents if document is not None}
+
+    def get_contents(self, sha256: Iterable[str], /) -> list[KnownContent]:
+        wanted, files, found = set(sha256), self._files(), list[KnownContent]()
+        for stored in files.values():
+            now, seen = stored, set[str]()
+            while now.became in files and now.item.id not in seen:
+                seen.add(now.item.id)
+                now = files[now.became]
+            number = "" if now.item.id in self.documents else now.item.part_number
+            found += [
+                KnownContent(
+                    sha256=revision.file_checksum or "",
+                    document=stored.item.id,
+                    revision_number=revision.revision_number,
+                    file_path=revision.file_path,
+                    now=now.item.id,
+                    part_number=number,
+                )
+                for revision in reversed(stored.revisions)
+                if revision.file_checksum in wanted
+            ]
+        return found
 
     def get_document(self, uuid: str, /) -> Document:
         stored = self._document(uuid.lower(), make=False)

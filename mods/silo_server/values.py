@@ -72,6 +72,7 @@ class Document:
     current_revision: int
     created_at: str
     created_by: str
+    became: str | None = None
 
     @property
     def subject(self) -> str:

@@ -8,12 +8,14 @@ import io
 import json
 import uuid
 import zipfile
+from pathlib import Path
 from typing import Any
 
 from hunting import BOTH
 from server_testing import Answer, Api, bom, form_body, merge_body
 
 from silo.api.client import SiloClient
+from silo.api.files import DocumentId, Origin
 
 SHOUTED = hashlib.sha256(b"two").hexdigest().upper()
 PNG = b"\x89PNG\r\n\x1a\n" + b"picture"
@@ -292,3 +294,28 @@ def test_a_bom_does_not_go_without_its_file(api: Api) -> None:
             gone = merge_body({bolt: 9}, document=document(b"gone", revision=revision), dry_run=dry_run)
             assert api.bad(409, "POST", bom(number, "merge"), gone)["error"] == "missing_revision"
     assert api.quantities(number) == {}
+
+
+def test_whose_content_it_is_now(api: Api, tmp_path: Path) -> None:
+    """A file that was a document of its own and got its part number: its old content leads to the new."""
+    silo = SiloClient(api.base_url, api.token)
+    item = silo.create_item("kindred-rd", "M01", "Plate")
+    document = DocumentId(str(uuid.uuid4()))
+    contents = {}
+    for name, of, former in (("before", document, ""), ("after", item.part_number, str(document))):
+        path = tmp_path / f"{name}.FCStd"
+        path.write_bytes(name.encode())
+        contents[name] = hashlib.sha256(name.encode()).hexdigest()
+        silo.upload_file(of, path, origin=Origin(file_path="parts/Plate.FCStd", former=former))
+    found = {one.sha256: one for one in silo.get_contents([*contents.values(), "0" * 64])}
+    assert found.keys() == set(contents.values())
+    before, after = (found[contents[name]] for name in ("before", "after"))
+    assert (before.document, before.now, before.part_number) == (document, item.id, item.part_number)
+    assert (after.document, after.now, after.part_number) == (item.id, item.id, item.part_number)
+    assert (before.revision_number, before.file_path) == (1, "parts/Plate.FCStd")
+    # Taken out of its item again, and back: the way does not go in a ring.
+    for of, former in ((document, item.id), (item.part_number, str(document)), (document, item.id)):
+        path.write_bytes(path.read_bytes() + b"!")
+        silo.upload_file(of, path, origin=Origin(former=former))
+    (now,) = silo.get_contents([contents["after"]])
+    assert (now.now, now.part_number) == (document, "")

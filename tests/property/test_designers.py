@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from desk import Desk, Document, Documents, Office, Silo
+from desk import Desk, Document, Office, Silo, Watched
 
 from silo.bom.errors import SiloError, UnreachableError
 from silo.outbox.entry import Entry, State
@@ -32,7 +32,7 @@ from silo.workbench.colleagues.theirs import Choice, Theirs, of_held
 from silo.workbench.commit.desk import CommitAnswer, Look
 from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.commit.plan import CommitPlan, DocumentRow
-from silo.workbench.documents.opened import DocumentOrigin, Opened
+from silo.workbench.documents.opened import Opened
 from silo.workbench.revisions.flow import RevisionFlow
 from silo.workbench.session.session import Session
 
@@ -57,24 +57,6 @@ class Disk(Store):
         if self.full:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         return super()._copied(source, copy, stamp)
-
-
-class Watched(Documents):
-    """FreeCAD's documents, with the observer that knows what each was made from."""
-
-    def __init__(self, opened: Opened) -> None:
-        super().__init__()
-        self.opened = opened
-
-    def base(self, doc: Any, /) -> DocumentOrigin:
-        if doc.closed:
-            raise ReferenceError("Cannot access attribute of deleted object")
-        return self.opened.of(doc)
-
-    def save(self, doc: Any, /) -> None:
-        self.opened.slotStartSaveDocument(doc, doc.FileName)
-        super().save(doc)
-        self.opened.slotFinishSaveDocument(doc, doc.FileName)
 
 
 class Paper(Document):

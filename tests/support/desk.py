@@ -27,7 +27,7 @@ from silo.registering.request import RegistrationRequest
 from silo.testing import FakeSilo
 from silo.workbench.commit.desk import CommitAnswer, Look
 from silo.workbench.commit.plan import CommitPlan
-from silo.workbench.documents.opened import DocumentOrigin
+from silo.workbench.documents.opened import DocumentOrigin, Opened
 from silo.workbench.documents.snapshot import Snapshot
 from silo.workbench.ghost import Differences, Ghost
 from silo.workbench.preview.comparison import Preview
@@ -171,6 +171,24 @@ class Documents:
         self.base(doc).stamp = stamp_of(doc.FileName)
         doc.changed = False
         self.saved.append(doc.Name)
+
+
+class Watched(Documents):
+    """FreeCAD's documents, with the observer that knows what each was made from."""
+
+    def __init__(self, opened: Opened) -> None:
+        super().__init__()
+        self.opened = opened
+
+    def base(self, doc: Any, /) -> DocumentOrigin:
+        if doc.closed:
+            raise ReferenceError("Cannot access attribute of deleted object")
+        return self.opened.of(doc)
+
+    def save(self, doc: Any, /) -> None:
+        self.opened.slotStartSaveDocument(doc, doc.FileName)
+        super().save(doc)
+        self.opened.slotFinishSaveDocument(doc, doc.FileName)
 
 
 @dataclass

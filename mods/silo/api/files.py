@@ -17,7 +17,7 @@ from silo.api.multipart import FileBody, FileForm, Progress
 from silo.api.replies import error_of
 from silo.api.revisions import checksum_of
 from silo.api.transport import MAX_ERROR, ApiCall, Cancel, Transport
-from silo.api.wire import Document, HeldItem, LinkedFile, Release, Revision, Scene, Wire
+from silo.api.wire import Document, HeldItem, KnownContent, LinkedFile, Release, Revision, Scene, Wire
 from silo.bom.errors import ConflictError, DocumentError, RejectedError, RouteMissingError, ServerFaultError
 from silo.bom.numbers import whole_number
 from silo.bom.text import with_allowed_characters
@@ -67,13 +67,14 @@ _PAGE = 1000  # revisions in one answer
 
 
 class Origin(Wire):
-    """What a client says of a file that it sends: the fields of :class:`Revision` of these names, and the
-    items in it."""
+    """What a client says of a file that it sends: the fields of :class:`Revision` of these names, the items
+    in it, and the document that it was before."""
 
     base_revision: int | None = None
     file_path: str = ""
     links: list[LinkedFile] | None = None
     items: list[HeldItem] | None = None
+    former: str = ""
 
 
 class MissingModels(Wire):
@@ -132,6 +133,17 @@ class FileCalls(Caller):
             reply = self._ask("the files", "documents", "by-uuid", uuids=wanted[at : at + _PAGE])
             documents |= {model.id: model for model in reply.models(Document, "documents", *LISTS)}
         return documents
+
+    def get_contents(self, sha256: Iterable[str], /) -> list[KnownContent]:
+        """Return whose revisions have these contents, and which document each file is now.
+
+        Raises RouteMissingError if the server knows no documents.
+        """
+        wanted, found = sorted(set(sha256)), list[KnownContent]()
+        for at in range(0, len(wanted), _PAGE):
+            reply = self._ask("the files", "documents", "by-content", sha256=wanted[at : at + _PAGE])
+            found += reply.models(KnownContent, "contents", *LISTS)
+        return found
 
     def get_document(self, uuid: str, /) -> Document:
         """Return a document, with the documents that it links to and those that link to it."""
@@ -298,6 +310,8 @@ def _upload_fields(
         fields["links"] = as_json([link.model_dump(exclude_defaults=True) for link in origin.links]).decode()
     if origin.items:
         fields["items"] = as_json([item.model_dump(exclude_defaults=True) for item in origin.items]).decode()
+    if origin.former:
+        fields["former"] = origin.former
     return fields
 
 

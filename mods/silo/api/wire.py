@@ -559,6 +559,24 @@ class Document(Revision):
     used_by: list[Document] = Field(default_factory=list)
 
 
+class KnownContent(Record):
+    """A content that a revision in Silo has: whose revision that is, and which document the file is now.
+
+    document, revision_number, file_path
+        the revision that has the content.
+    now, part_number
+        the document that the file became since (it was registered, split, or taken out of its item), or the
+        same; and its part number, "" without one.
+    """
+
+    sha256: str
+    document: str
+    revision_number: int
+    file_path: str | None = None
+    now: str
+    part_number: str = ""
+
+
 class Approval(Record):
     """Who approved a revision of a product, when, with which words."""
 

@@ -36,6 +36,21 @@ def note_arrived(entry: Entry, revision: Revision) -> None:
         write_record(entry.path, replace(record, since=entry.taken_at))
 
 
+def former_document(entry: Entry) -> str:
+    """Return the document that the file of a commit was before; "" if it is the same.
+
+    A part that got its number, a file whose item was taken out of it or that holds several now. A file of an
+    item that has the identity of another one is no later state of the first.
+    """
+    record = record_of(entry.path) if entry.path and entry.identity else None
+    if record is None or not record.document:
+        return ""
+    if record.is_of(entry.identity):
+        return record.former
+    is_item = not InFile.of(entry.document).own
+    return "" if record.item and is_item else record.document
+
+
 def _is_made_from(entry: Entry, before: FileRecord | None, here: str) -> bool:
     """Return True if what lies at a commit's place comes from the commit, though it was edited since."""
     if before is None or not before.sha256:

@@ -53,7 +53,7 @@ from silo.bom_sync.resolved import Resolved, resolve
 from silo.bom_sync.steps import Status, decide, merge_request, server_lines
 from silo.file_state import is_seen, is_set_back, stands
 from silo.outbox.entry import ASKED, SAME_PART, Entry, InFile, State, new_key
-from silo.outbox.recorded import note_arrived
+from silo.outbox.recorded import former_document, note_arrived
 from silo.outbox.report import Report, Sent
 from silo.outbox.store import OutboxError, Store
 from silo.project_folder import record_of
@@ -446,7 +446,13 @@ class _SendRun:
                 file_name=entry.file_name,
                 idempotency_key=entry.key,
                 sha256=entry.sha256,
-                origin=Origin(base_revision=base, file_path=entry.place, links=links, items=held or None),
+                origin=Origin(
+                    base_revision=base,
+                    file_path=entry.place,
+                    links=links,
+                    items=held or None,
+                    former=former_document(entry),
+                ),
                 cancelled=self.cancelled,
             )
         except DocumentError as error:  # users know their own file, not our copy

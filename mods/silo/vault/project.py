@@ -15,6 +15,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -34,6 +35,9 @@ from silo.bom.errors import (
 )
 from silo.bom.walk.identity import held_items
 from silo.bom.walk.links import extract, file_bom
+from silo.bom_sync.memory import server_of
+from silo.bom_sync.resolved import resolve
+from silo.bom_sync.steps import Status, decide, server_lines
 from silo.checksums import content_hash
 from silo.fcstd import Library
 from silo.fcstd.linked import recorded_paths
@@ -323,7 +327,9 @@ def name_documents(belonging: Belonging, client: SiloClient | None, *, new: bool
         for file in belonging.files
     ]
     named = {
-        new.place: FileRecord(new.document, uid=new.uid)
+        new.place: FileRecord(
+            new.document, uid=new.uid, former=old.record.document if old.record is not None else ""
+        )
         for old, new in zip(belonging.files, files, strict=True)
         if not old.document
     }
@@ -439,21 +445,26 @@ def commits(
     comment: str = "",
     allow_missing: bool = False,
     over_newer: Container[str] = (),
-    boms: bool = True,
+    boms: Container[str] | None = None,
+    hold: bool = False,
 ) -> Iterator[tuple[ProjectFile, Commit]]:
     """Make the commits of files that differ from Silo, and of the BOMs of the assemblies.
 
     over_newer
         files that are sent on top of newer revisions in Silo, which a person saw.
     boms
-        also the BOMs of files that are in Silo already.
+        the places of the files in Silo whose BOMs go as well; None: all of them.
+    hold
+        also files that are newer in Silo and edited here: the queue holds them for a choice.
     """
     users = _users(belonging)
     for standing in standings:
         file = standing.file
         is_over = standing.state in ON_TOP and file.path in over_newer
-        wanted = standing.state in (FileState.NEW, FileState.EDITED) or is_over
-        bom = file.bom if file.item and (wanted or (boms and standing.state is FileState.SAME)) else None
+        is_held = hold and standing.state in ON_TOP
+        wanted = standing.state in (FileState.NEW, FileState.EDITED) or is_over or is_held
+        is_open = standing.state is FileState.SAME and (boms is None or file.place in boms)
+        bom = file.bom if file.item and (wanted or is_open) else None
         if not wanted and bom is None:
             continue
         commit = Commit(
@@ -494,13 +505,18 @@ def left_in_queue(belonging: Belonging, store: Store, mine: Container[str] = ())
     ]
 
 
-def retry_held(belonging: Belonging, store: Store, over: Container[str]) -> None:
-    """Let held commits of these files go on top of the newer revisions that held them, at a person's word."""
+def retry_held(belonging: Belonging, store: Store, over: Container[str]) -> int:
+    """Let held commits of these files go on top of the newer revisions that held them, as the user wants;
+    return how many.
+    """
+    count = 0
     documents = {file.document.lower(): file.path for file in belonging.files if file.document}
     for entry in store.entries():
         path = documents.get(entry.identity.lower(), "")
         if entry.state is State.HELD and entry.newer and not entry.superseded and path in over:
             store.retry(entry.id)
+            count += 1
+    return count
 
 
 def _users(belonging: Belonging) -> dict[str, str]:
@@ -525,29 +541,77 @@ def keep(project: Project, store: Store, file: ProjectFile, commit: Commit, serv
     store.add(commit, server)
 
 
+@dataclass(frozen=True)
+class SentAlong:
+    """What became of the files below a committed one.
+
+    standings
+        of all of them, before anything was sent.
+    queued
+        the places of those whose file is in the queue now, also of those that a newer revision will hold.
+    more
+        how many BOMs and commits that were held can go now.
+    """
+
+    standings: tuple[FileStanding, ...] = ()
+    queued: frozenset[str] = frozenset()
+    more: int = 0
+
+    @property
+    def left_out(self) -> tuple[FileStanding, ...]:
+        """Return the files that Silo has otherwise, and that nothing sends."""
+        fine = (FileState.SAME, FileState.WAITING)
+        return tuple(
+            one for one in self.standings if one.state not in fine and one.file.place not in self.queued
+        )
+
+
 def send_along(
     path: str, client: SiloClient | None, store: Store, server: str, skip: Container[str] = (), **how: Any
-) -> int:
-    """Put into the queue the files to which a committed file links and that are not in Silo; returns how
-    many.
+) -> SentAlong:
+    """Put into the queue the files to which a committed file links and that are not in Silo, and the BOMs of
+    the others that were held back and can go now.
+
+    A file that was edited and is newer in Silo is queued too: it is held there for a choice.
 
     skip
-        files that a person has decided about.
+        files about which the user has decided.
     how
         as for :func:`commits`.
     """
     belonging = read_project([path], find_project([path]))
     if all(file.item and file.path in skip for file in belonging.files):
-        return 0
+        return SentAlong()
     belonging = name_documents(belonging, client)
+    retried = retry_held(belonging, store, how.get("over_newer", ()))
     standings = compare(belonging, client, store)
     remember(belonging.project, standings, client)
-    count = 0
-    for file, commit in commits(belonging, standings, boms=False, **how):
+    asked = [standing for standing in standings if standing.file.path not in skip]
+    boms = _open_boms(asked, client, allow_missing=bool(how.get("allow_missing")))
+    queued = set()
+    for file, commit in commits(belonging, standings, boms=boms, hold=True, **how):
         if file.path not in skip:
             keep(belonging.project, store, file, commit, server)
-            count += 1
-    return count
+            queued.add(file.place)
+    return SentAlong(tuple(asked), frozenset(queued), len(boms) + retried)
+
+
+def _open_boms(
+    standings: Iterable[FileStanding], client: SiloClient | None, *, allow_missing: bool
+) -> frozenset[str]:
+    """Return the places of the files in Silo whose BOM is not there as it is here, and can go."""
+    places = set()
+    for standing in standings if client is not None else ():
+        bom = standing.file.bom
+        if client is None or bom is None or not standing.file.item or standing.state is not FileState.SAME:
+            continue
+        with suppress(NotFoundError):
+            resolved = resolve(bom, client)
+            lines = server_lines(resolved, client)
+            decided = decide(resolved, lines, allow_missing=allow_missing, server=server_of(client))
+            if decided.status is Status.MERGED:
+                places.add(standing.file.place)
+    return frozenset(places)
 
 
 def remember(project: Project, standings: Iterable[FileStanding], client: SiloClient | None) -> None:

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Fetch an item's file with all that it links to into a scratch folder.
 
-The files themselves say what they link to. Which item a link means was written down by the commit; where it
-was not (an older client, another server), the item's BOM and its file names say it.
+The files themselves say what they link to. The commit wrote down with which content; whose file that is now
+is asked of the server at each pull. Where it was not written down (an older client, another server), the item
+that the commit named says it, or the item's BOM and its file names.
 """
 
 from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -19,7 +20,7 @@ from typing import TYPE_CHECKING
 from silo.api.files import DocumentId, download_revision
 from silo.api.revisions import checksum_of
 from silo.api.transport import Cancel, stop_if
-from silo.api.wire import Item, LinkedFile, Release, Revision
+from silo.api.wire import Item, KnownContent, LinkedFile, Release, Revision
 from silo.bom.errors import DocumentError, InputError, NotFoundError, RouteMissingError
 from silo.fcstd.linked import recorded_paths
 from silo.locator import refusal
@@ -108,6 +109,8 @@ class _Fetch:
     _revisions: dict[str, list[Revision]] = field(default_factory=dict)
     _contents: dict[tuple[str, int], tuple[Path, str]] = field(default_factory=dict)
     _sought: set[str] = field(default_factory=set)
+    _known: dict[str, list[KnownContent]] = field(default_factory=dict)
+    _contents_unknown: bool = False
 
     def tree(self, item: Item, number: int | None) -> FileTree:
         holder = self.holder(item)
@@ -226,11 +229,12 @@ class _Fetch:
         links = {link.path.replace("\\", "/"): link for link in linked_revision.links}
         ids = [link.item for link in links.values() if link.item]
         items = self.client.get_items_by_uuid(ids, cancelled=self.cancelled) if ids else {}
+        contents = self.contents(link.sha256 for link in links.values())
         others = _Children(self, holder.part_number)
         for path in recorded:
             link = links.get(path)
-            child = self.means(path, link, items, others)
             target = posixpath.normpath(posixpath.join(posixpath.dirname(position), path))
+            child = self.whose(link, target, contents) or self.means(path, link, items, others)
             why = _refused(path)
             if not why and child is None:
                 why = "no item in Silo is known for it: it was never committed"
@@ -239,15 +243,78 @@ class _Fetch:
             chosen = self.choose(child, link.sha256 if link else "", by_top=by_top) if child else None
             if not why and chosen is None:
                 why = f"{(child.part_number if child else '') or path} has no file in Silo"
-            if why or child is None or chosen is None:
+            if not why and child is not None and not self.proves(link, child, contents):
+                name = posixpath.basename(path)
+                why = (
+                    f"{posixpath.basename(position)} was committed with another {name}, which is not in Silo"
+                )
                 self.lost.append(LostLink(position, path, why))
-            else:
+                if chosen is None or (chosen.file_name or name).casefold() != name.casefold():
+                    continue
+            elif why:
+                self.lost.append(LostLink(position, path, why))
+                continue
+            if child is not None and chosen is not None:
                 yield target, child, chosen
+
+    def contents(self, wanted: Iterable[str]) -> dict[str, list[KnownContent]] | None:
+        """Find whose revisions have these contents; None if the server does not say, or if a release is
+        fetched, whose files were frozen with what they link to.
+        """
+        asked = set(filter(None, wanted))
+        if self.release is not None or self._contents_unknown:
+            return None
+        if new := asked - self._known.keys():
+            try:
+                found = self.client.get_contents(new)
+            except RouteMissingError:
+                self._contents_unknown = True
+                return None
+            self._known |= {sha256: [] for sha256 in new}
+            for content in found:
+                self._known[content.sha256].append(content)
+        return {sha256: self._known[sha256] for sha256 in asked}
+
+    def whose(
+        self, link: LinkedFile | None, target: str, contents: Mapping[str, Sequence[KnownContent]] | None
+    ) -> Holder | None:
+        """Find whose file a link leads to by the content that it was committed with, which says it best: the
+        file may have been registered, split or renamed since. None if that is not known.
+
+        Several documents may have one content: that which the commit named, or which lay at this place, then.
+        """
+        known = contents.get(link.sha256, ()) if contents is not None and link is not None else ()
+        if link is None or not known:
+            return None
+        named = {name.lower() for name in (link.document, link.item) if name}
+
+        def fits(content: KnownContent) -> tuple[bool, bool]:
+            return (content.document.lower() in named, content.file_path == target)
+
+        best = max(known, key=fits)
+        document = best.document if self.pinned else best.now
+        if best.part_number and document == best.now:
+            return Holder(best.part_number, best.now)
+        return Holder(DocumentId(document), document)
+
+    def proves(
+        self,
+        link: LinkedFile | None,
+        child: Holder,
+        contents: Mapping[str, Sequence[KnownContent]] | None,
+    ) -> bool:
+        """Return False if the linking file was committed with a content that no revision in Silo has."""
+        if link is None or not link.sha256 or self.release is not None:
+            return True  # an older revision, or a link to nothing: nothing is proven
+        if contents is not None:
+            return bool(contents.get(link.sha256))
+        checksums = {checksum_of(revision) for revision in self.revisions(child)} - {""}
+        return not checksums or link.sha256 in checksums
 
     def means(
         self, path: str, link: LinkedFile | None, items: Mapping[str, Item], others: _Children
     ) -> Holder | None:
-        """Find the item or document to which a link leads."""
+        """Find the item or document to which a link leads, by what the commit named."""
         if link is not None and link.document:
             own = Holder(DocumentId(link.document), link.document)
             if self.revisions(own):

@@ -606,6 +606,11 @@ def _follows_and_assignees(op: Operations) -> None:
     )
 
 
+def _documents_that_became_others(op: Operations) -> None:
+    """Keep which document a file is now, after it was registered, split, or taken out of its item."""
+    op.add_column("documents", Column("became", String(36)))
+
+
 STEPS: dict[str, Callable[[Operations], None]] = {
     "0007": _first_schema,
     "0008": _answers,
@@ -618,4 +623,5 @@ STEPS: dict[str, Callable[[Operations], None]] = {
     "0016": _supplier_parts_and_orders,
     "0017": _origins_of_facts,
     "0018": _follows_and_assignees,
+    "0019": _documents_that_became_others,
 }

@@ -130,6 +130,7 @@ documents = Table(
     needed("current_revision", Integer),
     needed("created_at", Stamp),
     needed("created_by", String(64)),
+    Column("became", Uuid),
     sqlite_autoincrement=True,
 )
 

@@ -30,6 +30,8 @@ from silo_server.routes import openapi
 from silo_server.routes.answers import READ_ERRORS, WRITE_ERRORS, etag_of, json_answer
 from silo_server.routes.call import Call, Editor, Viewer
 from silo_server.routes.models import (
+    ChecksumsBody,
+    ContentsOut,
     DocumentsOut,
     ItemChangeBody,
     ItemOut,
@@ -56,6 +58,7 @@ from silo_server.services.documents import (
     linked_from,
     linking_to,
     make_document,
+    of_contents,
     shown,
 )
 from silo_server.services.drawn_picture import keep_picture
@@ -314,6 +317,7 @@ _FORM: openapi.Schema = {
         "type": "string",
         "description": "a JSON list of the items in the file: item (UUID), object",
     },
+    "former": openapi.text(36, description="the document (UUID) that the file was before"),
 }
 UPLOAD = {
     **openapi.refused(
@@ -421,6 +425,7 @@ async def receive(call: Call, find: Find) -> Response:
             _path(form.get("path")),
             _list("links", _LINKS, form.get("links")),
             _list("items", _HELD, form.get("items")),
+            _former(form.get("former")),
         )
         key, text, digest = idempotency_key(call.request), str(comment or ""), sha256 or ""
 
@@ -513,7 +518,10 @@ def store_file(
         )
     with call.write() as tx:
         of = find(tx, True)
-        content = (stored.name, stored.checksum, comment, properties, asdict(origin))
+        told = asdict(origin)
+        if not told["former"]:  # a repeat of a request that was made before there was this field
+            del told["former"]
+        content = (stored.name, stored.checksum, comment, properties, told)
         kind = "upload" if isinstance(of, Item) else "upload document"
         request = KeyedRequest.of(f"{kind} {of.id}", key, content)
         if earlier := earlier_answer(tx, request):
@@ -527,6 +535,14 @@ def store_file(
         scene.fill_in(tx, call.server.files, stored.checksum)
         keep_answer(tx, request, KeptAnswer(str(revision.revision_number)))
         return answer(tx, of, revision)
+
+
+def _former(raw: object) -> str:
+    if raw is None or raw == "":
+        return ""
+    if not isinstance(raw, str):
+        raise RejectedError("former: wanted the UUID of a document")
+    return items.normal_uuid(raw)
 
 
 def _base_revision(raw: object) -> int | None:
@@ -624,6 +640,14 @@ def get_documents(call: Viewer, body: UuidsBody) -> Response:
     with call.read() as tx:
         documents = shown(tx, documents_by_uuid(tx, body.uuids))
     return json_answer({"documents": [to_wire(document) for document in documents]})
+
+
+@by_uuid.post("/documents/by-content", response_model=ContentsOut)
+def get_contents(call: Viewer, body: ChecksumsBody) -> Response:
+    """Return whose revisions have these contents (SHA-256), and which document each file is now."""
+    with call.read() as tx:
+        found = of_contents(tx, body.sha256)
+    return json_answer({"contents": [to_wire(content) for content in found]})
 
 
 @by_uuid.get("/items/{part_number}/documents", response_model=DocumentsOut)

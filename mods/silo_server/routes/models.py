@@ -156,6 +156,14 @@ class UuidsBody(RequestBody):
     uuids: list[Short] = Field(max_length=10_000)
 
 
+class ChecksumsBody(RequestBody):
+    """``POST /api/documents/by-content``."""
+
+    sha256: list[Annotated[str, WithJsonSchema(openapi.SHA256), Field(pattern="^[0-9a-f]{64}$")]] = Field(
+        max_length=10_000
+    )
+
+
 class LookAlikeQuery(RequestBody):
     """A component that may be an item already: its name, and the SHA-256 of its file."""
 
@@ -224,6 +232,12 @@ class DocumentsOut(BaseModel):
     """The documents that were found; what is missing is absent."""
 
     documents: list[wire.Document]
+
+
+class ContentsOut(BaseModel):
+    """Whose revisions have the contents that were asked for; unknown ones are absent."""
+
+    contents: list[wire.KnownContent]
 
 
 class RevisionBody(RequestBody):

@@ -46,6 +46,22 @@ class ShownDocument:
     holds: tuple[Mapping[str, str], ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class KnownContent:
+    """A content that a revision of a document has: whose it is, and which document its file is now.
+
+    now, part_number
+        the document that it became, or the same; and the item of that, "" without one.
+    """
+
+    sha256: str
+    document: str
+    revision_number: int
+    file_path: str | None
+    now: str
+    part_number: str
+
+
 def find_document(tx: Tx, uuid: str, *, lock: bool = False) -> Document | None:
     """Find the document with this UUID; None if there is none.
 
@@ -115,6 +131,62 @@ def note_revision(
     own = select(revisions.c.id).where(with_picture).exists()
     drawn = one_of(tx, items.c.id, {item for item, _ in pairs}) & items.c.thumbnail_key.is_not(None) & ~own
     tx.conn.execute(update(items).where(drawn).values(thumbnail_key=None))
+
+
+def note_former(tx: Tx, document: Document, former: str) -> None:
+    """Note which document a file was before its newest revision: it was registered, split, or taken out of
+    its item. Links to the former document lead to this one from now on.
+    """
+    row = documents.c
+    tx.conn.execute(update(documents).where(row.id == document.id).values(became=None))
+    if former and former != document.uuid:
+        tx.conn.execute(update(documents).where(row.uuid == former).values(became=document.uuid))
+
+
+def of_contents(tx: Tx, contents: Iterable[str]) -> list[KnownContent]:
+    """Find the documents that have a revision with one of these contents, the newest revision first."""
+    query = (
+        select(documents.c.uuid, revisions)
+        .join(revisions, revisions.c.document_id == documents.c.id)
+        .where(one_of(tx, revisions.c.file_checksum, set(contents)))
+        .order_by(revisions.c.id.desc())
+    )
+    rows = tx.conn.execute(query).all()
+    now = _followed(tx, {row.uuid for row in rows})
+    last = {document.uuid: document for document in documents_by_uuid(tx, list(now.values()))}
+    ids = {document.item_id for document in last.values() if document.item_id is not None}
+    where = select(items.c.id, items.c.part_number).where(one_of(tx, items.c.id, ids))
+    numbers = {row.id: row.part_number for row in tx.conn.execute(where)}
+    found = []
+    for row in rows:
+        document = last.get(now[row.uuid])
+        number = numbers.get(document.item_id, "") if document is not None and document.item_id else ""
+        found.append(
+            KnownContent(
+                row.file_checksum, row.uuid, row.revision_number, row.file_path, now[row.uuid], number
+            )
+        )
+    return found
+
+
+def _followed(tx: Tx, uuids: set[str]) -> dict[str, str]:
+    """Return which document each of these is now."""
+    became: dict[str, str] = {}
+    left = uuids
+    while left:
+        where = select(documents.c.uuid, documents.c.became).where(one_of(tx, documents.c.uuid, left))
+        step = {row.uuid: row.became for row in tx.conn.execute(where) if row.became}
+        became |= step
+        left = set(step.values()) - became.keys()
+    return {uuid: _last(uuid, became) for uuid in uuids}
+
+
+def _last(uuid: str, became: Mapping[str, str]) -> str:
+    seen = {uuid}
+    while (following := became.get(uuid)) is not None and following not in seen:
+        uuid = following
+        seen.add(uuid)
+    return uuid
 
 
 def documents_holding(tx: Tx, item: Item) -> list[Document]:

@@ -20,7 +20,7 @@ from silo_server.db.tables import items, revisions
 from silo_server.db.transaction import Tx
 from silo_server.events import announce
 from silo_server.fields import from_row, to_wire
-from silo_server.services.documents import document_of, documents_holding, note_revision
+from silo_server.services.documents import document_of, documents_holding, note_former, note_revision
 from silo_server.services.file_store import StoredFile
 from silo_server.services.search import index_item
 from silo_server.times import spec_time
@@ -30,13 +30,14 @@ from silo_server.values import Document, Item, Revision
 
 @dataclass(frozen=True, slots=True)
 class RevisionOrigin:
-    """What the client says of a file: the revision that it was made from, its place, what it links to, and
-    which items (UUID and object) are in it."""
+    """What the client says of a file: the revision that it was made from, its place, what it links to, which
+    items (UUID and object) are in it, and which document it was before."""
 
     base_revision: int | None = None
     path: str | None = None
     links: Sequence[Mapping[str, str]] | None = None
     items: Sequence[Mapping[str, str]] | None = None
+    former: str = ""
 
 
 def _of(holder: Item | Document) -> ColumnElement[bool]:
@@ -97,6 +98,8 @@ def add_revision(
     )
     if document is not None:
         note_revision(tx, document, number, origin.links or (), origin.items or ())
+        if file is not None:
+            note_former(tx, document, origin.former)
     if item is not None:
         changed: dict[str, Any] = {"current_revision": number}
         if file and file.thumbnail_key:

@@ -18,14 +18,16 @@ from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from silo.bom.compare.states import ComparedAssembly
 from silo.bom.errors import DocumentError, SiloError
 from silo.outbox.entry import UNKNOWN, Commit, new_key, on_top
 from silo.platform import one_path
+from silo.project_folder import record_of
 from silo.workbench.activity.box import Action, Do, PaneEntry, not_in_silo_key, own_box
 from silo.workbench.colleagues.look import FileToCheck, look
+from silo.workbench.colleagues.states import state_words
 from silo.workbench.colleagues.theirs import Choice, Theirs
 from silo.workbench.commit.desk import CommitAnswer, CommitDesk
 from silo.workbench.commit.plan import CommitPlan, DocumentRow, DocumentState, plan, refusal
@@ -37,6 +39,9 @@ from silo.workbench.session.session import Session
 from silo.workbench.settings.preferences import ALLOW, Preferences
 from silo.workbench.tone import Tone
 from silo.workbench.words import translate
+
+if TYPE_CHECKING:
+    from silo.vault.project import SentAlong
 
 
 class CommitFlow:
@@ -64,6 +69,8 @@ class CommitFlow:
         self._asked_for: set[str] = set()
         # Path → what a person wrote about a file that has no item yet.
         self._comments: dict[str, str] = {}
+        # Files without an item that are sent as documents once they are saved.
+        self._documents: set[str] = set()
 
     @property
     def running(self) -> bool:
@@ -102,10 +109,7 @@ class CommitFlow:
         """Commit a document: ask if there is something to ask, then return without waiting."""
         if not doc.FileName:
             self._desk.save_as(doc)
-        # A file of several registered parts is no item, and needs none: it is sent as a document.
-        unregistered = bool(
-            doc.FileName and not self._desk.identity(doc) and not self._desk.snapshot(doc).several
-        )
+        unregistered = bool(doc.FileName and not self._desk.identity(doc) and not self._is_document(doc))
         planned = plan(doc, self._desk.documents, unregistered=unregistered)
         if text := refusal(planned):
             if planned.top.state is not DocumentState.UNNAMED:
@@ -119,17 +123,35 @@ class CommitFlow:
             )
         if answer is None:
             return
+        if not unregistered:
+            # What is no item is sent as a document, after it is saved: nothing else sends it.
+            self._documents |= {row.path for row in answer.rows if not self._desk.identity(row.document)}
         self.run(answer.rows, answer.comment)
         if not unregistered:
-            decided = {row.path for row in planned.rows}
-            top = planned.top.path
-            # The top too, if it is no item: nothing else sends it.
-            skip = decided if self._desk.identity(doc) else decided - {top}
-            self.send_linked(top, skip, answer.comment)
+            self.send_linked(planned.top.path, self._decided(planned, answer), answer.comment)
         for row, theirs, choice in answer.choices:
             self.choose(row.path, theirs, choice)
         if answer.register:
             self._then(self._registering(planned.top.path))
+
+    def _is_document(self, doc: Any) -> bool:
+        """Return True for a file that is no item's and needs none: of several registered parts, or one that
+        is a document in Silo already, such as a skeleton.
+        """
+        record = record_of(doc.FileName)
+        is_known = record is not None and bool(record.revision) and not record.item
+        return is_known or self._desk.snapshot(doc).several
+
+    def _decided(self, planned: CommitPlan, answer: CommitAnswer) -> set[str]:
+        """Return the files that the commit itself sends, and those that the user left out. All others are
+        compared with Silo as they are on disk: FreeCAD's marks say what must be saved, not what differs.
+        """
+        sent = {row.path for row in answer.rows if self._desk.identity(row.document)}
+        chosen = {row.path for row in answer.rows}
+        left_out = {
+            row.path for row in planned.rows if row.path not in chosen and (row.wanted or row.replaced)
+        }
+        return sent | left_out | {row.path for row, _theirs, _choice in answer.choices}
 
     def commit_folder(self, root: str, paths: Iterable[str], comment: str) -> None:
         """Save the edited ones of these open files of a project, then send what Silo does not have of it."""
@@ -142,8 +164,9 @@ class CommitFlow:
         for row in left:
             self._tell_error(row.label, row.note)
         ready = tuple(row for row in rows.values() if row.wanted and row.state is DocumentState.CHANGED)
-        self.run(ready, comment)
         sent = {row.path for row in ready if self._desk.identity(row.document)}
+        self._documents |= {row.path for row in ready} - sent
+        self.run(ready, comment)
         self.send_linked(root, {*sent, *(row.path for row in left)}, comment)
 
     def send_linked(self, path: str, skip: set[str], comment: str, over: Collection[str] = ()) -> None:
@@ -169,14 +192,16 @@ class CommitFlow:
         how["allow_missing"] = self._preferences.text("MissingLinks") == ALLOW
         title = translate("Silo", "Looking at the linked files")
 
-        def work(client: Any, server: str) -> int:
+        def work(client: Any, server: str) -> SentAlong:
             from silo.vault.project import send_along  # late: FreeCAD's start waits for this module
 
             return send_along(path, client, self._session.outbox, server, skip, **how)
 
-        def sent(count: int) -> None:
-            if count:
+        def sent(along: SentAlong) -> None:
+            if along.queued or along.more:
                 self._session.send(force=True)
+            if along.left_out:
+                self._session.add(left_out_box(path, along))
 
         def failed(error: SiloError) -> None:
             self._tell_error(os.path.basename(path), str(error))
@@ -328,8 +353,9 @@ class CommitFlow:
         elif snapshot.identity:
             self._keep(taken, snapshot, comment)
         else:
-            if not snapshot.several:
+            if not snapshot.several and snapshot.path not in self._documents:
                 self._session.add(not_in_silo(snapshot))
+            self._documents.discard(snapshot.path)
             if comment:
                 self._comments[snapshot.path] = comment
 
@@ -395,6 +421,15 @@ def commit_of(
         allow_missing=allow_missing,
         remark=taken.problem,
     )
+
+
+def left_out_box(path: str, along: SentAlong) -> PaneEntry:
+    """Make the box for a commit of which files below it were left out: one line for each, with the reason."""
+    title = translate("Silo", "Not all files below it are in Silo: {name}", name=os.path.basename(path))
+    lines = [f"{one.file.place}: {state_words(one.state)}" for one in along.left_out]
+    same = sum(one.state.name == "SAME" for one in along.standings)
+    rest = translate("Silo", "{n} sent, {same} the same in Silo", n=len(along.queued), same=same)
+    return own_box(f"left-out:{path}:{time.time()}", title, *lines, rest, tone=Tone.WARNING)
 
 
 def not_in_silo(taken: Snapshot) -> PaneEntry:

@@ -73,6 +73,11 @@ class DocumentRow:
     @property
     def note(self) -> str:
         """Describe the state in words."""
+        if self.replaced:
+            return translate(
+                "Silo",
+                "another program changed the file since it was opened: reload it, or commit yours over it",
+            )
         lost = plain(", ".join(self.lost), 300)
         return _words()[self.state].replace("{lost}", lost)
 

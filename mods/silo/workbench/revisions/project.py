@@ -14,8 +14,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from silo.bom.errors import DocumentError, InputError, SiloError
+from silo.outbox.entry import State
 from silo.platform import one_path
 from silo.project_folder import PROJECT_FILE, Project
+from silo.workbench.colleagues.states import state_words
 from silo.workbench.colleagues.theirs import Choice, Theirs, theirs_of
 from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.desk import MOST_S
@@ -63,18 +65,7 @@ class ProjectRow:
 
     def words(self) -> str:
         """Describe its state, for people."""
-        texts = {
-            "SAME": translate("Silo", "in Silo"),
-            "NEW": translate("Silo", "not in Silo"),
-            "EDITED": translate("Silo", "edited since its commit"),
-            "NEWER": translate("Silo", "newer in Silo"),
-            "BOTH": translate("Silo", "edited, and newer in Silo"),
-            "WAITING": translate("Silo", "waits to be sent"),
-            "HELD": translate("Silo", "held for your choice"),
-            "SET_BACK": translate("Silo", "the server was restored from a backup: it has an older one"),
-            "UNKNOWN": translate("Silo", "its item is not on this server"),
-        }
-        row_words = [texts[self.state.name]]
+        row_words = [state_words(self.state)]
         if self.edits:
             row_words.append(translate("Silo", "unsaved edits"))
         if self.moved_from:
@@ -194,7 +185,13 @@ class ProjectFlow:
                 self._commits.commit_folder(self.view.root, (row.path,), "")
             self._commits.send_linked(row.path, set(), "", over=(row.path,))
         elif row.theirs is not None:
-            self._files.choose(row.path, row.theirs, choice)
+            self._files.choose(row.path, row.theirs, choice, taken=lambda: self._drop_held(row.path))
+
+    def _drop_held(self, path: str) -> None:
+        """Discard the held commits of a file that was replaced by the newer one; copies of them are kept."""
+        for entry in self._session.outbox.entries():
+            if entry.path == path and entry.state is State.HELD:
+                self._session.discard(entry.id, keep=True)
 
     def open(self, row: ProjectRow) -> None:
         """Open a file of the project."""
