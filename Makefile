@@ -21,7 +21,7 @@ BIN := $(VENV)/bin
 DEV := $(VENV)/.installed-dev
 SERVER := $(VENV)/.installed-server
 
-.PHONY: help demo test test-postgres test-machine test-windows-files test-other-disk check translations release setup docs clean
+.PHONY: help demo test mutants test-postgres test-machine test-windows-files test-other-disk check translations release setup docs clean
 
 help:
 	@echo "make demo   set up and sync a real assembly with the embedded server (DEMO=--keep leaves it running)"
@@ -30,6 +30,7 @@ help:
 	@echo "make test-machine  the tests that need FreeCAD or Chromium on the machine"
 	@echo "make test-windows-files  the tests with the file semantics of Windows, simulated"
 	@echo "make test-other-disk  the tests on a disk that does not distinguish upper and lower case (Linux, FUSE)"
+	@echo "make mutants  plant a mutant of each rule that keeps data (scripts/mutants.toml); each has to die"
 	@echo "make docs   the site of the documentation, in build/site"
 	@echo "make release  build, try and list what would be published, in dist/; tags and publishes nothing"
 	@echo "make check  ruff, mypy, import directions, plain English"
@@ -88,6 +89,9 @@ test-other-disk: setup
 ON_MACHINE = $(shell grep -rlE --include='test_*.py' 'mark\.(freecad|browser)' tests)
 test-machine: setup
 	$(IN_MEMORY) $(BIN)/python -m pytest $(SPREAD) --dist loadscope -m "freecad or browser" tests/browser $(ON_MACHINE)
+
+mutants: setup
+	$(IN_MEMORY) $(BIN)/python scripts/mutants.py
 
 translations: setup
 	$(BIN)/python scripts/translations.py $(LANGUAGE)

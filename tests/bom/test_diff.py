@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from silo.bom import BomDiff, BomEntry, FindingCode, Severity, diff_bom
+from silo.bom.compare.merge import plan_merge
 from silo.bom.quantities import as_number, same_quantity
 
 
@@ -238,3 +239,12 @@ def test_pieces_have_many_names(unit: str | None) -> None:
     """A line whose unit means pieces is CAD's as any other."""
     assert diff_bom(local(P=9), [line("P", 9, unit=unit)]).unchanged == ({"part_number": "P", "quantity": 9},)
     assert diff_bom(local(P=9), [line("P", 8, unit=unit)]).quantity_changed
+
+
+def test_an_override_whose_component_is_gone_is_reported_until_the_server_knows() -> None:
+    """A user changed the quantity of CAD's line; now CAD has no such component: the reviewers are asked."""
+    override = {**line("A", 3, "manual"), "override": True, "assembly_told": False}
+    assert plan_merge([], [override]).conflicts_to_report == ("A",)
+    known = {**override, "assembly_told": True, "assembly_quantity": 0}
+    assert plan_merge([], [known]).conflicts_to_report == ()
+    assert plan_merge([], [{**override, "override": False}]).conflicts_to_report == ()

@@ -122,3 +122,16 @@ def test_a_person_s_quantity_becomes_an_override_that_merges_report(api: Api) ->
     assert (answer["diff"]["removed"], api.quantities(parent)) == ([], {a: 6})
     back = api.edit_line(parent, a, quantity=4)
     assert (back["source"], back["override"], back["cad_quantity"]) == ("assembly", False, None)
+
+
+def test_an_alternate_of_a_component_keeps_its_quantity_through_a_merge(api: Api) -> None:
+    """A merge changes CAD's line of the child; the alternate that a user added for the same child stays."""
+    parent, child, other = api.items(3)
+    api.merge(parent, {child: 1, other: 1})
+    fields = {"rel_type": "alternate", "quantity": 7, "notes": "from the second supplier"}
+    api.add_line(parent, child, **fields)
+    mine = {**fields, "source": "manual", "unreferenced_since": None, "override": False}
+    for entries in ({child: 3, other: 1}, {other: 1}, {child: 2, other: 1}):
+        api.merge(parent, entries)
+        lines = [line for line in api.get(bom(parent)) if line["rel_type"] == "alternate"]
+        assert [{name: line[name] for name in mine} for line in lines] == [mine]

@@ -565,3 +565,13 @@ def test_a_request_that_is_sent_again_names_the_file_as_it_is_numbered_now(vault
     once(vault, "merge_bom", lambda: theirs(vault, b"three", 1))
     vault.send(force=True)
     assert (vault.waiting(), vault.files(), vault.lines()) == ((), [b"two", b"three"], {})
+
+
+def test_a_commit_made_from_an_older_revision_of_ours_is_no_set_back(vault: Vault) -> None:
+    """The newest revision is known here and is older than nothing: a press for all must not undo it."""
+    sent(vault, b"one", b"two")
+    mine(vault, b"three", b"one", bom=False)
+    vault.send()
+    assert "restored from a backup" not in held(vault).reason
+    vault.send(force=True)
+    assert vault.files() == [b"one", b"two"]
