@@ -16,7 +16,9 @@ from silo.bom.findings import respelt_findings
 from silo.bom.items.resolve import unregistered_findings
 from silo.bom.walk.document import LinkProblem
 from silo.bom.walk.facts import Files
+from silo.bom.walk.links import _Walker
 from silo.bom.walk.roles import Reader
+from silo.bom.walk.roots import as_it_is
 
 
 class Scene:
@@ -140,6 +142,17 @@ def no_role() -> Iterable[Finding]:
     return scene.walked(odd, scene.top.link("L", scene.bolt))
 
 
+def unexplained() -> Iterable[Finding]:
+    """Lines that lack what the assembly shows."""
+    scene = Scene()
+    body = scene.top.body("Lost")
+    walker = _Walker(None, None, as_it_is, True, True)
+    top = scene.top.assembly(body, scene.top.link("L", scene.bolt))
+    walker.reader.contents(top)
+    walker.look_for_unexplained(top, ())
+    return walker.notes.findings()
+
+
 def two_roles() -> Iterable[Finding]:
     """A screw of the assembly, taken for one that lies beside it."""
     scene = Scene()
@@ -209,6 +222,7 @@ SCENES: dict[FindingCode, Callable[[], Iterable[Finding]]] = {
     ),
     FindingCode.NO_ROLE: no_role,
     FindingCode.TWO_ROLES: two_roles,
+    FindingCode.UNEXPLAINED: unexplained,
     FindingCode.EMPTY_BOM: lambda: extract(Doc("/v/top.FCStd").assembly()).findings,
     FindingCode.COPIED_IDENTITY: lambda: one_identity(("/v/a.FCStd", "A"), ("/v/b.FCStd", "B")),
     FindingCode.SHARED_IDENTITY: lambda: one_identity(("/v/a.FCStd", "A"), ("/v/a.FCStd", "B")),

@@ -229,8 +229,7 @@ class FindingCode(StrEnum):
         "hidden",
         _I,
         "hidden pieces, counted or not",
-        "press *Count It* or *Reference*, or `silo-mod register TOP.FCStd --count OBJECT` or `--not-a-part"
-        " OBJECT`; the file keeps the answer",
+        "set `SiloBomExclude` on an object: false counts it, true leaves it out; the file keeps the answer",
         "Hidden in {obj}: {what}.",
     )
     MODIFIED_HERE = (
@@ -342,6 +341,13 @@ class FindingCode(StrEnum):
         "an object has no role in the count; please report this",
         "report it, with the file if you are allowed to share it",
         "{obj} has no role in the count; please report this.",
+    )
+    UNEXPLAINED = (
+        "unexplained",
+        _W,
+        "an object is neither counted nor named; please report this",
+        "count it by hand, and report it, with the file if you are allowed to share it",
+        "{obj} lies in the assembly, and is neither counted nor named; please report this.",
     )
     TWO_ROLES = (
         "two_roles",

@@ -17,6 +17,7 @@ from __future__ import annotations
 import os.path
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from silo.bom.entry import BomEntry, Extraction, walk_entries
@@ -35,10 +36,19 @@ from silo.bom.walk.roots import Whole, as_it_is, beside, choose_assembly, fates,
 from silo.bom.walk.shared_identity import identity_findings
 from silo.bom.walk.standard import same_articles, standard_uuid
 from silo.bom.walk.targets import Inspect, resolve_target
+from silo.bom.walk.unexplained import counted_twice, unexplained
 from silo.bom.walk.variants import Variant
 
 # Real assemblies are some ten levels deep; deeper is an attack or a loop that no other guard saw.
 MAX_LEVELS = 64
+# Why an object in an assembly does not count; an error is a reason as well.
+_REASONS = frozenset(
+    {
+        *(FindingCode.SUPPRESSED, FindingCode.EXCLUDED, FindingCode.CONSUMED, FindingCode.MODIFIED_HERE),
+        *(FindingCode.COINCIDENT, FindingCode.HIDDEN, FindingCode.NO_HARDWARE, FindingCode.UNSET_LINK),
+        *(FindingCode.SUB_ELEMENT_LINK, FindingCode.NO_COMPONENT, FindingCode.IN_DOCUMENT_LINK),
+    }
+)
 
 
 def extract_bom_links(assembly_obj: Any, level: int = 1) -> list[BomEntry]:
@@ -134,6 +144,8 @@ def extract(
         walker.notes.empty(head)
     if target.obj is not None:
         walker.look_beside(top, empty=not entries)
+        walker.say_what_is_hidden(top)
+        walker.look_for_unexplained(top, (*entries, *mine))
     for entry, other in same_articles_of(walk_entries(entries)):
         walker.notes.same_article(entry, other)
     findings = walker.notes.findings()
@@ -213,6 +225,8 @@ class _Walker:
         self._containers: dict[Key, bool] = {}
         self._nameless: dict[int, list[Any]] = {}
         self._held: dict[Key, set[str]] = {}
+        # The assemblies of the walk, with the names of the objects that their lines count.
+        self._counted: dict[Key, tuple[Any, set[str]]] = {}
 
     def component(self, obj: Any) -> Key:
         """Return the identity of a component; it is its key if it has a name.
@@ -333,6 +347,9 @@ class _Walker:
             children = self._below(target, level + 1, depth + 1, inner)
             goes_on = self._goes_below and self._is_container(name, target)
             mine = self.own_lines(target, level + 1) if goes_on else ()
+            if goes_on and name not in self._counted and not isinstance(target, Lost):
+                names = {shown for line in (*children, *mine) for shown in line.instances}
+                self._counted[name] = (target, names)
             entries.append(self._entry(container, counts, level, children, own=mine))
         self._memo[(key, level, entry)] = tuple(entries)
         return self._memo[(key, level, entry)]
@@ -354,6 +371,31 @@ class _Walker:
             if role is None:
                 self.notes.add(FindingCode.NO_ROLE, top.Document.getObject(name))
         self.notes.beside(beside(top, roles), empty=empty)
+
+    def say_what_is_hidden(self, top: Any) -> None:
+        """Name what is hidden in a chosen part; an assembly has said it."""
+        contents = self.reader.contents(top)
+        if not contents.is_assembly(top):
+            self.notes.hidden(top, contents.hidden_counted, contents.hidden, contents.references)
+
+    def look_for_unexplained(self, top: Any, lines: Sequence[BomEntry]) -> None:
+        """Look at each assembly of the walk without believing its roles."""
+        self._counted[self.component(top)] = (top, {name for line in lines for name in line.instances})
+        named: dict[str, set[str]] = {}
+        for finding in self.notes.findings():
+            if finding.blocks or finding.code in _REASONS:
+                for place in finding.where:
+                    named.setdefault(place.doc_path, set()).add(place.obj)
+        for container, counted in self._counted.values():
+            contents = self.reader.contents(container)
+            if contents.tree is None or contents.is_part or not contents.is_assembly(container):
+                continue
+            here = named.get(self.notes.place(container).doc_path, set())
+            has_view = partial(self.reader.has_view, container.Document)
+            for obj in unexplained(contents.tree, counted, here.__contains__, has_view):
+                self.notes.add(FindingCode.UNEXPLAINED, obj)
+            for obj in counted_twice(contents.tree, counted, has_view):
+                self.notes.add(FindingCode.TWO_ROLES, obj)
 
     def own_lines(self, container: Any, level: int) -> tuple[BomEntry, ...]:
         """Make entries of the parts of its own file that an assembly shows and that are no items yet."""
