@@ -62,8 +62,8 @@ from silo.bom.errors import (
     VersionConflictError,
 )
 from silo.bom.left_out import Reason, remembered
-from silo.bom.quantities import counts_pieces
 from silo.bom.text import name_key
+from silo.bom.units import counts_pieces
 from silo.bom.walk.identity import as_uuid
 
 __all__ = ["FakeSilo"]

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from silo.bom.units import line_unit
+
 
 @dataclass(frozen=True, slots=True)
 class NewEvent:
@@ -146,7 +148,15 @@ class Line(NamedTuple):
     child_item_type: str
     child_current_revision: int
     child_archived: bool
+    child_unit: str | None
     state: LineState
+
+    @property
+    def unit(self) -> str | None:
+        """Return the unit that the quantity is in, as it is shown; None for pieces that need no word."""
+        if self.state.unit or not self.child_unit:
+            return self.state.unit
+        return line_unit(None, self.child_unit, from_cad=self.state.source == "assembly").symbol
 
     @property
     def newer_revision_exists(self) -> bool:

@@ -102,7 +102,8 @@ def add(tx: Tx, numbers: list[str], dice: random.Random) -> None:
 
 
 def edit(tx: Tx, numbers: list[str], dice: random.Random) -> None:
-    change = dice.choice([{"quantity": 9.0}, {"child_revision": 0}, {"rel_type": "alternate"}])
+    units: list[dict[str, Any]] = [{"unit": unit} for unit in ("mm", "m", "box", "pcs", "", None)]
+    change = dice.choice([{"quantity": 9.0}, {"child_revision": 0}, {"rel_type": "alternate"}, *units])
     change_line(tx, dice.choice(numbers[:ASSEMBLIES]), dice.choice(numbers), change)
 
 
@@ -118,6 +119,10 @@ def state(tx: Tx, numbers: list[str], dice: random.Random) -> None:
         "currency": dice.choice([None, "USD"]),
     }
     patch_properties(tx, dice.choice(numbers), values)
+
+
+def measure(tx: Tx, numbers: list[str], dice: random.Random) -> None:
+    change_item(tx, dice.choice(numbers), ItemChange(texts={"unit": dice.choice(["m", "pcs", "box", ""])}))
 
 
 def rename(tx: Tx, numbers: list[str], dice: random.Random) -> None:
@@ -143,7 +148,23 @@ def undo(tx: Tx, numbers: list[str], dice: random.Random) -> None:
 
 
 STEPS: list[Callable[[Tx, list[str], random.Random], None]] = [
-    *(merge, merge, merge, refuse, add, edit, decide, state, state, archive, bring_back, undo, rename)
+    *(
+        merge,
+        merge,
+        merge,
+        refuse,
+        add,
+        edit,
+        decide,
+        state,
+        state,
+        archive,
+        bring_back,
+        undo,
+        rename,
+        measure,
+        measure,
+    )
 ]
 
 

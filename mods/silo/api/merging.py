@@ -40,7 +40,8 @@ from silo.bom.errors import (
     SiloError,
     listed,
 )
-from silo.bom.quantities import same_quantity, says_the_same
+from silo.bom.quantities import same_quantity
+from silo.bom.units import says_the_same
 
 if TYPE_CHECKING:
     from silo.api.boms import BomCalls
@@ -148,7 +149,9 @@ def without_manual(
             )
         )
         for entry in manual_entries
-        if not says_the_same(entry.quantity, (line := manual[_key(entry)]).quantity, line.unit)
+        if not says_the_same(
+            entry.quantity, (line := manual[_key(entry)]).quantity, line.unit, line.child_unit
+        )
         and _key(entry) not in marked
     ]
     return result.model_copy(update={"warnings": [*result.warnings, *warnings]})

@@ -116,6 +116,10 @@ class ItemTexts(Wire):
     long_description: Annotated[
         str | None, Field(title="Long description", json_schema_extra={"long": True})
     ] = None
+    unit: Annotated[str | None, Field(title="Unit", json_schema_extra={"maxLength": 32, "word": False})] = (
+        None
+    )
+    """In which its quantities are, and of one of which its price and mass are; None: in pieces."""
 
 
 class Price(Wire):
@@ -252,6 +256,8 @@ class LineTexts(Wire):
 class BomLine(LineTexts, Record):
     """A BOM line as the server has it. ``unreferenced_since`` is set while no assembly component uses it.
 
+    ``child_unit``: the unit of the child, which a line without a ``unit`` is in, unless CAD counted it.
+    ``unit_open``: the line's unit is of another kind than the child's, so that it counts in no sum.
     ``assembly_told``: the server has heard what the assembly says of this line that people own, namely
     ``assembly_quantity``; None where the server does not keep that.
     ``components``: what the line was in the CAD model of the last sync.
@@ -264,6 +270,7 @@ class BomLine(LineTexts, Record):
     child_name: str = ""
     child_description: str = ""
     child_item_type: str = ""
+    child_unit: str | None = None
     rel_type: str = "component"
     quantity: Number | None = None
     total_quantity: Number | None = None
@@ -273,6 +280,7 @@ class BomLine(LineTexts, Record):
     source: Annotated[Source, BeforeValidator(_known_source)] = "assembly"
     unreferenced_since: Time = None
     override: bool = False
+    unit_open: bool = False
     assembly_told: bool | None = None
     assembly_quantity: Number | None = None
     components: list[dict[str, Any]] = Field(default_factory=list)

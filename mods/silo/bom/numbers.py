@@ -30,7 +30,8 @@ from enum import StrEnum
 from fractions import Fraction
 from typing import NamedTuple
 
-from silo.bom.quantities import LARGEST_QUANTITY, PIECE_WORDS, plain
+from silo.bom.quantities import LARGEST_QUANTITY, plain
+from silo.bom.units import known_unit
 
 LONGEST = 40
 """[characters] no number that a person types is longer."""
@@ -96,7 +97,7 @@ class NumberReading(NamedTuple):
 _SPACES = re.compile(r"(?<=\d)[\s'’_\u00a0\u2009\u202f](?=\d{3}(?!\d))")
 _SHAPE = re.compile(r"(?P<sign>[+\-−]?)(?P<body>[0-9][0-9.,]*|[.,][0-9]+)(?:[eE](?P<exp>[+\-−]?[0-9]{1,3}))?")
 _FRACTION = re.compile(r"(?P<sign>[+\-−]?)(?P<whole>[0-9]*)\s?(?P<part>[¼-¾⅐-⅞])")
-_COUNT_WORD = re.compile(rf"(?P<number>.*?[0-9¼-¾⅐-⅞.,])\s*(?:x|×|{PIECE_WORDS})", re.IGNORECASE)
+_COUNT_WORD = re.compile(r"(?P<number>.*?[0-9¼-¾⅐-⅞.,])\s*(?P<word>[^\W\d_]+\.?|×)")
 
 
 def parse_number(text: str, mark: Mark | None = None) -> Number | None:
@@ -148,7 +149,11 @@ def read_count(text: str, mark: Mark | None = None, *, points_are_decimal: bool 
     """Read a number as :func:`read_number` does; the text may name the unit: "4 pcs", "4x", "4 Stk."."""
     short = text.strip()
     counted = _COUNT_WORD.fullmatch(short) if len(short) <= 2 * LONGEST else None
-    return read_number(counted["number"] if counted else text, mark, points_are_decimal=points_are_decimal)
+    unit = known_unit(counted["word"]) if counted else None
+    in_pieces = unit is not None and unit.counts_pieces
+    return read_number(
+        counted["number"] if counted and in_pieces else text, mark, points_are_decimal=points_are_decimal
+    )
 
 
 def read_quantity(text: str, mark: Mark | None = None, *, points_are_decimal: bool = False) -> NumberReading:

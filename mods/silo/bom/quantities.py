@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The quantity of a BOM line: exact sums and products, equality, and the units that count pieces."""
+"""The quantity of a BOM line: exact sums and products, and equality."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from decimal import Context, Decimal
 from functools import reduce
@@ -14,15 +13,6 @@ LARGEST_QUANTITY = 1e9
 """The most pieces (or metres, or litres) of a BOM line."""
 
 _WIDE = Context(prec=80)
-
-# A pattern: "pcs" and what means the same.
-PIECE_WORDS = r"(?:pcs?|pieces?|ea|each|units?|stk|stck|st|stück|pz|шт|個|个|件)\.?"
-_PIECE = re.compile(PIECE_WORDS, re.IGNORECASE)
-
-
-def counts_pieces(unit: str | None) -> bool:
-    """Return True for no unit and for "pcs" or the like, in which CAD counts."""
-    return not unit or not unit.strip() or _PIECE.fullmatch(unit.strip()) is not None
 
 
 def as_decimal(value: float | int | Decimal) -> Decimal:
@@ -84,8 +74,3 @@ def same_quantity(a: object, b: object) -> bool:
     if x is None or y is None:
         return x is y
     return isclose(x, y, rel_tol=RELATIVE_TOLERANCE, abs_tol=1e-12)
-
-
-def says_the_same(cad_quantity: object, quantity: object, unit: str | None) -> bool:
-    """Return True if a line has as many pieces as CAD."""
-    return counts_pieces(unit) and same_quantity(cad_quantity, quantity)

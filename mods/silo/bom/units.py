@@ -15,6 +15,7 @@ time      s, min, h                                  h
 The rules:
 
 * no unit means the unit of the item; an item without a unit counts pieces;
+* CAD counts pieces: a line of an assembly without a unit is in pieces, whatever the unit of the item is;
 * units of one kind convert exactly, in decimals; units of two kinds do not convert: that is an open question;
 * spellings are read in upper and lower case, and in the languages of the tables that companies bring. ``M``
   and ``MM`` are lengths; a spelling that two units share is not read;
@@ -27,7 +28,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from enum import StrEnum
 
-from silo.bom.quantities import exact_product
+from silo.bom.quantities import exact_product, same_quantity
 
 
 class UnitKind(StrEnum):
@@ -60,7 +61,14 @@ class Unit:
 
     def converts_to(self, other: Unit) -> bool:
         """Return True if a quantity in this unit has an equal one in the other."""
-        return self.kind is other.kind and (self.kind is not UnitKind.OTHER or self.symbol == other.symbol)
+        if self.kind is UnitKind.OTHER:
+            return other.kind is UnitKind.OTHER and self.symbol.casefold() == other.symbol.casefold()
+        return self.kind is other.kind
+
+    @property
+    def counts_pieces(self) -> bool:
+        """Return True for the unit in which CAD counts."""
+        return self.kind is UnitKind.PIECES
 
 
 PIECES = Unit("pcs", UnitKind.PIECES)
@@ -119,6 +127,30 @@ def unit_of(text: str | None, item_unit: str | None = None) -> Unit:
         if given and given.strip():
             return known_unit(given) or Unit(" ".join(given.split()), UnitKind.OTHER)
     return PIECES
+
+
+def line_unit(text: str | None, item_unit: str | None, *, from_cad: bool) -> Unit:
+    """Return the unit of a BOM line. ``from_cad``: its quantity is that of the assembly."""
+    return unit_of(text, None if from_cad else item_unit)
+
+
+def counts_pieces(text: str | None, item_unit: str | None = None) -> bool:
+    """Return True if a line that a user owns is in pieces, in which CAD counts."""
+    return unit_of(text, item_unit).counts_pieces
+
+
+def says_the_same(
+    cad_quantity: object, quantity: object, unit: str | None, item_unit: str | None = None
+) -> bool:
+    """Return True if a line that a user owns has as many pieces as CAD."""
+    return counts_pieces(unit, item_unit) and same_quantity(cad_quantity, quantity)
+
+
+def stored_unit(text: str | None) -> str | None:
+    """Write a unit in its one form: ``pcs`` for "Stk."; a word that is no unit as it is; None for no word."""
+    if text is None or not text.strip():
+        return None
+    return unit_of(text).symbol
 
 
 def converted(quantity: Decimal, unit: Unit, into: Unit) -> Decimal | None:

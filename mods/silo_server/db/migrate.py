@@ -9,6 +9,7 @@ has the identifier of the last of the seven steps that led to it, so that a data
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -31,13 +32,16 @@ from sqlalchemy import (
     select,
 )
 
-from silo.bom.errors import ConfigError
+from silo.bom.errors import ConfigError, listed
+from silo.bom.units import known_unit, stored_unit
 from silo_server.db.database import Database
 from silo_server.db.tables import NAMES, needed, only, primary
 from silo_server.db.transaction import MIGRATION_LOCK
 
 if TYPE_CHECKING:
     from alembic.operations import Operations
+
+_log = logging.getLogger("silo_server.migrate")
 
 Id = BigInteger().with_variant(Integer, "sqlite")
 Stamp = String(32)
@@ -611,6 +615,58 @@ def _documents_that_became_others(op: Operations) -> None:
     op.add_column("documents", Column("became", String(36)))
 
 
+def _units(op: Operations) -> None:
+    """Give items a unit, and write the units of lines and orders in their one form.
+
+    A word that is no unit that we know stays, and is listed: its line is an open question from now on.
+    """
+    op.add_column("items", Column("unit", String(32)))
+    op.create_index("ix_items_unit", "items", ["id"], **only("unit IS NOT NULL"))
+    op.create_index("ix_bom_lines_unit", "bom_lines", ["parent_id"], **only("unit IS NOT NULL"))
+    bind = op.get_bind()
+    tables = {name: Table(name, MetaData(), autoload_with=bind) for name in _WITH_UNITS}
+    for name in ("bom_lines", "orders"):
+        column = tables[name].c.unit
+        for unit in bind.scalars(select(column).distinct().where(column.is_not(None))).all():
+            if unit != stored_unit(unit):
+                bind.execute(tables[name].update().where(column == unit).values(unit=stored_unit(unit)))
+    # History is the same lines as they were: with other spellings, none of them would be as it was.
+    history = tables["bom_change_lines"]
+    some = '%"unit":%'
+    query = select(history.c.change_id, history.c.line_id, history.c.before, history.c.after)
+    for change_id, line_id, *sides in bind.execute(
+        query.where(history.c.before.like(some) | history.c.after.like(some))
+    ).all():
+        before, after = map(_with_stored_unit, sides)
+        if [before, after] != sides:
+            this = (history.c.change_id == change_id) & (history.c.line_id == line_id)
+            bind.execute(history.update().where(this).values(before=before, after=after))
+    bind.execute(tables["product_summaries"].delete())  # they have more in them now
+    lines, parents = tables["bom_lines"], tables["items"]
+    query = select(lines.c.unit, parents.c.part_number).join(parents, parents.c.id == lines.c.parent_id)
+    unknown: dict[str, set[str]] = {}
+    for spelling, number in bind.execute(query.where(lines.c.unit.is_not(None))).all():
+        if known_unit(spelling) is None:
+            unknown.setdefault(spelling, set()).add(number)
+    for unit, numbers in sorted(unknown.items()):
+        _log.warning(
+            "the unit %r is none that we know; lines of %s have it", unit, listed(sorted(numbers), 20)
+        )
+
+
+_WITH_UNITS = ("bom_lines", "orders", "bom_change_lines", "product_summaries", "items")
+
+
+def _with_stored_unit(text: str | None) -> str | None:
+    state = json.loads(text) if text else {}
+    if "unit" not in state or state["unit"] == stored_unit(state["unit"]):
+        return text
+    unit = stored_unit(state["unit"])
+    state = {name: unit if name == "unit" else value for name, value in state.items()}
+    kept = {name: value for name, value in state.items() if value is not None}
+    return json.dumps(kept, separators=(",", ":"), ensure_ascii=False)
+
+
 STEPS: dict[str, Callable[[Operations], None]] = {
     "0007": _first_schema,
     "0008": _answers,
@@ -624,4 +680,5 @@ STEPS: dict[str, Callable[[Operations], None]] = {
     "0017": _origins_of_facts,
     "0018": _follows_and_assignees,
     "0019": _documents_that_became_others,
+    "0020": _units,
 }

@@ -49,6 +49,7 @@ Uuid = String(36)
 
 # What waits for a person, for indexes that hold little else; a query must say it in these words.
 UNREFERENCED = "unreferenced_since IS NOT NULL"
+WITH_UNIT = "unit IS NOT NULL"
 INCOMPLETE = "left_out <> '[]' OR refused_at IS NOT NULL"
 # A label that is taken; and the one submission that waits for its approval.
 NUMBERED = "status IN ('review', 'released', 'obsolete')"
@@ -91,6 +92,7 @@ items = Table(
     needed("description", Text),
     Column("sourcing_type", String(64)),
     Column("long_description", Text),
+    Column("unit", String(32)),
     Column("thumbnail_key", String(64)),
     needed("properties", Text),
     Column("supplier_parts", Text),
@@ -109,6 +111,7 @@ items = Table(
     Index(None, "archived_at", "updated_at", "part_number_key"),
     Index(None, "item_type", "archived_at", "part_number_key"),
     Index(None, "category", "archived_at", "part_number_key"),
+    Index("ix_items_unit", "id", **only(WITH_UNIT)),
     sqlite_autoincrement=True,
 )
 
@@ -211,6 +214,7 @@ bom_lines = Table(
     UniqueConstraint("parent_id", "child_id", "rel_type"),
     Index(None, "child_id"),
     Index("ix_bom_lines_unreferenced", "parent_id", **only(UNREFERENCED)),
+    Index("ix_bom_lines_unit", "parent_id", **only(WITH_UNIT)),
 )
 
 bom_changes = Table(

@@ -22,6 +22,7 @@ from sqlalchemy.exc import IntegrityError
 from silo.api.wire import FACTS, FactSource, ItemTexts, Stated
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError, VersionConflictError
 from silo.bom.text import REFUSED_CHARACTERS, character_problem
+from silo.bom.units import stored_unit
 from silo.bom.walk.identity import as_uuid
 from silo_server.db.answers import KeptAnswer, KeyedRequest, earlier_answer, keep_answer
 from silo_server.db.rows import one_of
@@ -36,6 +37,7 @@ from silo_server.services.search import index_item, search_for
 from silo_server.user_json import check_json, dumps, merge_patch
 from silo_server.values import Item
 
+LONGEST_UNIT = 32
 # Words that stand where a part number stands in a path.
 RESERVED = frozenset({"by-uuid", "search", "export.csv", "import", "new"})
 # Two numbers that look the same must be the same number: what has no picture is refused. These are the
@@ -307,7 +309,7 @@ def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
         "item_type": item_type,
         "name": name or description or number,
         "description": description or name,
-        **new.texts,
+        **_stored_texts(new.texts),
         "properties": "{}",
         "made_from": made_from.lower() if isinstance(made_from, str) and len(made_from) <= 64 else None,
         "current_revision": 0,
@@ -522,6 +524,17 @@ def _item_type(given: str | None, category: Category | None) -> str:
     return given
 
 
+def _stored_texts(texts: Mapping[str, str | None]) -> dict[str, str | None]:
+    """Return texts as they are stored: a unit in its one form. RejectedError for what is no unit."""
+    if (unit := texts.get("unit")) is None:
+        return dict(texts)
+    if problem := character_problem(unit) or ("" if len(unit.strip()) <= LONGEST_UNIT else "it is too long"):
+        raise RejectedError(
+            f"unit: wanted a word such as m or kg, at most {LONGEST_UNIT} characters: {problem}"
+        )
+    return {**texts, "unit": stored_unit(unit) or ""}
+
+
 def _changed_values(item: Item, change: ItemChange) -> dict[str, Any]:
     number = change.part_number
     if number not in (None, item.part_number):  # a number that is older than a rule may stay
@@ -534,5 +547,5 @@ def _changed_values(item: Item, change: ItemChange) -> dict[str, Any]:
         "category": find_schema(item.schema).category(change.category).code if change.category else None,
     }
     changed = {key: value for key, value in given.items() if value != getattr(item, key)}
-    changed |= {key: value for key, value in change.texts.items() if value != item.texts[key]}
+    changed |= {key: value for key, value in _stored_texts(change.texts).items() if value != item.texts[key]}
     return {key: value for key, value in changed.items() if value is not None}

@@ -18,7 +18,8 @@ from typing import NamedTuple
 from sqlalchemy import insert, or_, select, update
 
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError, counted, listed
-from silo.bom.quantities import counts_pieces, exact_product, exact_sum, plain
+from silo.bom.quantities import exact_product, exact_sum, plain
+from silo.bom.units import counts_pieces
 from silo_server.db.rows import one_of
 from silo_server.db.tables import document_items, documents, items, orders, revisions
 from silo_server.db.transaction import Tx

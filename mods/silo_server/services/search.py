@@ -161,8 +161,12 @@ def rebuild_index(tx: Tx) -> int:
     return count
 
 
-# A choice is no word to search for: half of the items would be found.
-_TEXTS = [name for name, field in ItemTexts.model_fields.items() if "options" not in text_hints(field)]
+# A choice or a unit is no word to search for: half of the items would be found.
+_TEXTS = [
+    name
+    for name, field in ItemTexts.model_fields.items()
+    if "options" not in (hints := text_hints(field)) and hints.get("word", True)
+]
 
 
 def _index(tx: Tx, ids: list[int], *, new: bool = False) -> None:

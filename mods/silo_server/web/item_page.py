@@ -34,13 +34,13 @@ from silo_server.services.documents import documents_holding, get_document
 from silo_server.services.following import is_followed
 from silo_server.services.items import ItemQuery, get_item, list_items
 from silo_server.services.looks import last_look
-from silo_server.services.product.amounts import Exact, multiplied
+from silo_server.services.product.amounts import Exact, product, totals_of
 from silo_server.services.product.flat import FlatRow, flatten, leaves_in
 from silo_server.services.product.graph import MAX_DEPTH, Graph, load_graph
 from silo_server.services.product.line_filter import found_parts, leading_to, sought
 from silo_server.services.product.parts import RolledItem, parts_of, some_parts
 from silo_server.services.product.rollup import roll_up_cost, roll_up_mass
-from silo_server.services.product.summary import MassAndCost, Summary
+from silo_server.services.product.summary import MassAndCost, Summary, in_unit_of
 from silo_server.services.product.summary_make import MOST_NAMED, own_worth
 from silo_server.services.product.summary_read import at_once, marks_of, standing_alone, summaries, summary_of
 from silo_server.services.product.where_used import use_counts, where_used
@@ -105,8 +105,10 @@ class Look:
 
 @dataclass(frozen=True, slots=True)
 class Branch:
-    """A row of the tree. ``total``: of all pieces; ``key`` names the branch, "" if nothing is below.
+    """A row of the tree. ``key`` names the branch, "" if nothing is below.
 
+    total
+        of all pieces, in ``unit``, of one of which ``worth`` is; None below a line whose unit is open.
     marks
         what is open about the line, or, below a closed branch, in it.
     """
@@ -114,7 +116,8 @@ class Branch:
     line: Line
     part: RolledItem
     depth: int
-    total: Exact
+    total: Exact | None
+    unit: str | None
     worth: MassAndCost
     marks: Sequence[str] = ()
     key: str = ""
@@ -123,24 +126,38 @@ class Branch:
     @property
     def mass(self) -> Decimal | None:
         """Return the mass of all pieces [kg]."""
-        return None if self.worth.mass is None else self.worth.mass * as_decimal(self.total)
+        return _times(self.total, self.worth.mass)
 
     @property
     def costs(self) -> Mapping[str, Decimal]:
         """Return the cost of all pieces, per currency."""
-        return {currency: cost * as_decimal(self.total) for currency, cost in self.worth.costs.items()}
+        costs = {currency: _times(self.total, cost) for currency, cost in self.worth.costs.items()}
+        return {currency: cost for currency, cost in costs.items() if cost is not None}
+
+
+def _times(total: Exact | None, value: Decimal | None) -> Decimal | None:
+    return None if total is None or value is None else value * as_decimal(total)
 
 
 class StructureRow(NamedTuple):
     """An open row of the tree before it is dressed; ``above``: the key of what it is in, None if it can be
     no branch.
+
+    flat
+        it is a row of the flat list, in the unit of its part.
     """
 
     line: Line
     depth: int
-    total: Exact
+    total: Exact | None
     above: str | None = None
     is_open: bool = False
+    flat: bool = False
+
+    @property
+    def unit(self) -> str | None:
+        """Return the unit of the total."""
+        return self.line.child_unit if self.flat else self.line.unit
 
     @property
     def key(self) -> str:
@@ -195,11 +212,11 @@ class ShownStructure:
         return self._lines.get(item_id, ())
 
     def worth(self, line: Line) -> MassAndCost:
-        """Return mass and cost of one piece of a line's child, to sort by it."""
+        """Return mass and cost of one unit of a line, to sort by it."""
         if line.child_id not in self._worths:
             known = self._known({other.child_id for other in self._lines[line.parent_id]})
             self._worths |= {child: worth for child, (_part, worth, _summary) in known.items()}
-        return self._worths[line.child_id]
+        return in_unit_of(line, self._worths[line.child_id])
 
     def _known(self, children: Collection[int]) -> dict[int, tuple[RolledItem, MassAndCost, Summary | None]]:
         """Read each child, its mass and cost, and its summary; without a BOM it has what it states."""
@@ -219,11 +236,12 @@ class ShownStructure:
         def dress(row: StructureRow, doubts: Sequence[str]) -> Branch:
             child = row.line.child_id
             part, worth, summary = known[child]
+            worth = worth if row.flat else in_unit_of(row.line, worth)
             if summary is None:
-                return Branch(row.line, part, row.depth, row.total, worth, doubts)
+                return Branch(row.line, part, row.depth, row.total, row.unit, worth, doubts)
             marks = [*summary.inside(child, is_open=row.is_open), *doubts]
             key = row.key if row.is_open or summary.levels else ""
-            return Branch(row.line, part, row.depth, row.total, worth, marks, key, row.is_open)
+            return Branch(row.line, part, row.depth, row.total, row.unit, worth, marks, key, row.is_open)
 
         return [dress(*row) for row in rows]
 
@@ -270,12 +288,12 @@ def _walk(shown: ShownStructure) -> Iterator[StructureRow]:
         below = shown.lines_of(item_id, level)
         return arranged([line for line in below if hit(line)], look.sort, keys) if below else ()
 
-    exact: Exact = look.pieces
+    exact: Exact | None = look.pieces
     stack = [(1, exact, "", iter(lines_of(graph.root.id, 0)))]
     while stack:
         level, factor, above, lines = stack[-1]
         for line in lines:
-            total = multiplied(factor, line)
+            total, amount = totals_of(factor, line)
             if line.state.rel_type != "component" or level >= MAX_DEPTH:
                 yield StructureRow(line, level, total)
                 continue
@@ -284,7 +302,7 @@ def _walk(shown: ShownStructure) -> Iterator[StructureRow]:
             inner = lines_of(line.child_id, level) if is_open else ()
             if inner:
                 yield row._replace(is_open=True)
-                stack.append((level + 1, total, row.key, iter(inner)))
+                stack.append((level + 1, amount, row.key, iter(inner)))
                 break
             yield row
         else:
@@ -303,17 +321,14 @@ def _keys(
         # Currencies cannot be compared; if there are several, the amounts are.
         return max(worth(row).costs.values(), default=None)
 
-    def times(row: R, value: Decimal | None) -> Decimal | None:
-        return None if value is None else value * as_decimal(total(row))
-
     return {
         "number": lambda row: line(row).child_part_number.casefold(),
         "name": lambda row: line(row).child_name.casefold(),
         "total": total,
         "unit_mass": lambda row: worth(row).mass,
-        "mass": lambda row: times(row, worth(row).mass),
+        "mass": lambda row: _times(total(row), worth(row).mass),
         "unit_cost": cost,
-        "cost": lambda row: times(row, cost(row)),
+        "cost": lambda row: _times(total(row), cost(row)),
     }
 
 
@@ -330,7 +345,10 @@ def flat_page(shown: ShownStructure) -> Page[Branch]:
     rows = arranged(shown.found, look.sort, _flat_keys(shown))
     table = page_of(rows, len(shown.leaves), look.page, shown.page_rows)
     here = shown.dressed(
-        [(StructureRow(row.line, 1, row.total * look.pieces), row.doubts(look.pieces)) for row in table.rows]
+        [
+            (StructureRow(row.line, 1, product(row.total, look.pieces), flat=True), row.doubts(look.pieces))
+            for row in table.rows
+        ]
     )
     return Page(here, table.total, table.found, table.number, table.size)
 

@@ -18,7 +18,8 @@ from silo.api.wire import LineTexts
 from silo.bom.errors import RejectedError
 from silo.bom.headers import designators
 from silo.bom.numbers import read_quantity
-from silo.bom.quantities import counts_pieces, same_quantity
+from silo.bom.quantities import same_quantity
+from silo.bom.units import counts_pieces
 from silo_server.db.transaction import Tx
 from silo_server.schema import text_hints
 from silo_server.services.bom import history
@@ -235,13 +236,13 @@ def _cad_words(
     if line.child_id in quantities:
         cad_quantity = quantities[line.child_id]
         return (
-            _("CAD says %(quantity)s", quantity=of_cad(cad_quantity, line.state.unit))
+            _("CAD says %(quantity)s", quantity=of_cad(cad_quantity, line.unit))
             if cad_quantity
             else _("CAD no longer has it")
         )
     if merge is not None and by_hand is not None and merge.id > by_hand.id:
         return _("CAD says the same")
-    return _("CAD said %(quantity)s before", quantity=of_cad(line.state.cad_quantity, line.state.unit))
+    return _("CAD said %(quantity)s before", quantity=of_cad(line.state.cad_quantity, line.unit))
 
 
 def of_cad(count: float | None, unit: str | None) -> str:

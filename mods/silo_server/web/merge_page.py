@@ -363,6 +363,7 @@ def _show(call: Call, part_number: str, asked: PageState, status: int = 200) -> 
         last=last,
         gaps=in_sentences(last.gaps),
         unreferenced=review_of.unreferenced,
+        units=review_of.units,
         most_shown=MOST_SHOWN,
         most_forms=MOST_FORMS,
         conflicts=review_of.conflicts,

@@ -12,7 +12,6 @@ from fastapi import APIRouter, Query
 from starlette.responses import Response
 
 from silo.bom.errors import ConflictError, SiloError
-from silo.bom.quantities import as_decimal
 from silo_server.db.transaction import Tx
 from silo_server.errors import TooLargeError
 from silo_server.routes.call import Call
@@ -23,6 +22,7 @@ from silo_server.services.items import get_item
 from silo_server.services.product.flat import flatten
 from silo_server.services.product.frozen import ProductContent, frozen_product
 from silo_server.services.product.graph import MAX_DEPTH
+from silo_server.services.product.summary import in_unit_of
 from silo_server.services.product.summary_read import summary_of
 from silo_server.services.product.tree import expand
 from silo_server.services.releases import Release
@@ -164,15 +164,16 @@ def release_page(
 
 
 def _rows(product: ProductContent, *, flat: bool) -> Any:
-    """Yield the rows of the table: the line, its depth, its total, mass and cost of one piece."""
+    """Yield the rows of the table: line, depth, total, the unit of that, what one unit is worth."""
     if flat:
         for row in flatten(product.graph):
-            yield row.line, 1, row.total, product.worths[row.line.child_id]
+            yield row.line, 1, row.total, row.unit, product.worths[row.line.child_id]
         return
     for occurrence in expand(product.graph, MAX_DEPTH, MOST_ROWS):
         yield (
             occurrence.line,
             occurrence.depth,
-            as_decimal(occurrence.total),
-            product.worths[occurrence.line.child_id],
+            occurrence.total,
+            occurrence.line.unit,
+            in_unit_of(occurrence.line, product.worths[occurrence.line.child_id]),
         )

@@ -42,6 +42,7 @@ KINDS: Mapping[str, tuple[str, Callable[[Waiting], int]]] = {
     "conflicts": (N_("conflicts"), lambda row: row.conflicts),
     "incomplete": (N_("incomplete syncs"), lambda row: row.left_out),
     "unregistered": (N_("unregistered parts"), lambda row: row.unregistered),
+    "units": (N_("lines with unit?"), lambda row: row.units),
 }
 _SORTS: Mapping[str, Callable[[Waiting], Any]] = {
     "number": lambda row: row.part_number.casefold(),
@@ -51,6 +52,7 @@ _SORTS: Mapping[str, Callable[[Waiting], Any]] = {
     "conflicts": lambda row: row.conflicts,
     "incomplete": lambda row: row.left_out,
     "unregistered": lambda row: row.unregistered,
+    "units": lambda row: row.units,
     "assignee": lambda row: row.assignee.casefold(),
     "synced": lambda row: row.synced_at,
 }

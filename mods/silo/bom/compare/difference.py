@@ -23,7 +23,8 @@ from typing import Any
 from silo.bom.compare.bom_diff import BomChange, BomDiff, QuantityChange
 from silo.bom.compare.owner import is_component, is_manual
 from silo.bom.entry import BomEntry
-from silo.bom.quantities import as_number, counts_pieces, exact_sum, plain, same_quantity, says_the_same
+from silo.bom.quantities import as_number, exact_sum, plain, same_quantity
+from silo.bom.units import counts_pieces, says_the_same
 
 # (file, object) of a component; the file relative to the assembly's, as a merge names it.
 Component = tuple[str, str]
@@ -87,7 +88,7 @@ def diff_bom(
     manual_lines: list[_Line] = []
     manual_components: list[_Line] = []
     for remote in remote_entries:
-        unit = remote.get("unit") or ""
+        unit = remote.get("unit") or (remote.get("child_unit") if is_manual(remote) else "") or ""
         unit = "" if counts_pieces(unit) else unit
         line = _Line(remote["child_part_number"], as_number(remote.get("quantity")), unit)
         if is_manual(remote):

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from silo.bom.quantities import counts_pieces
+from silo.bom.units import counts_pieces
 
 
 def is_manual(line: Mapping[str, Any]) -> bool:

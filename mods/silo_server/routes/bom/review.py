@@ -45,7 +45,10 @@ class ResolveBody(RequestBody):
 
 @router.get("/review")
 def get_review(call: Viewer, part_number: str) -> Response:
-    """Return the open questions of a BOM: unreferenced lines, conflicts (both values), and the last merge."""
+    """Return the open questions of a BOM: unreferenced lines, conflicts, units, and the last merge.
+
+    ``units`` are the lines in a unit of another kind than their part's, which count in no sum.
+    """
     with call.read() as tx:
         bom_review = review.review(tx, part_number)
         open_below = summary_of(tx, bom_review.parent).open_boms(bom_review.parent.id)
@@ -65,6 +68,7 @@ def get_review(call: Viewer, part_number: str) -> Response:
             }
             for conflict in bom_review.conflicts
         ],
+        "units": [line_to_wire(line, name) for line in bom_review.units],
         "last_merge": change_to_wire(bom_review.last_merge) if bom_review.last_merge else None,
         "below": dict(open_below),
     }

@@ -19,6 +19,7 @@ from silo_server.routes.call import Viewer
 from silo_server.routes.models import LineOut
 from silo_server.services.bom.line_wire import child_to_wire, line_state_to_wire, revisions_to_wire
 from silo_server.services.items import get_item
+from silo_server.services.product.amounts import unit_is_open
 from silo_server.services.product.flat import flatten
 from silo_server.services.product.graph import MAX_DEPTH, load_graph
 from silo_server.services.product.parts import parts_of, positive_number
@@ -63,6 +64,7 @@ def get_flat(call: Viewer, part_number: str) -> dict[str, Any]:
                 "unit": row.unit,
                 **({"unreferenced_quantity": plain(row.gone)} if row.gone else {}),
                 **({"in_conflict": True} if row.disputed else {}),
+                **({"unit_open": True} if row.unit_open else {}),
             }
             for row in flatten(graph)
         ],
@@ -157,9 +159,11 @@ def render_expanded(rows: Iterable[Occurrence]) -> bytes:
             revisions = b'"effective_revision":%d,"newer_revision_exists":false' % line.child_current_revision
         else:
             revisions = _members(revisions_to_wire(line))
+        amount = b"null" if total is None else repr(plain(total)).encode()
+        unit_open = b"true" if unit_is_open(line) else b"false"
         parts.append(
-            b'{"id":"%b","parent_part_number":%b,%b,%b,%b,"depth":%d,"total_quantity":%b}'
-            % (line.id.encode(), above, child, state, revisions, depth, repr(plain(total)).encode())
+            b'{"id":"%b","parent_part_number":%b,%b,%b,%b,"unit_open":%b,"depth":%d,"total_quantity":%b}'
+            % (line.id.encode(), above, child, state, revisions, unit_open, depth, amount)
         )
     return b"[" + b",".join(parts) + b"]"
 

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 from sqlalchemy import select
 
-from silo.bom.quantities import says_the_same
+from silo.bom.units import says_the_same
 from silo_server.db.rows import one_of
-from silo_server.db.tables import bom_conflicts, bom_lines
+from silo_server.db.tables import bom_conflicts, bom_lines, items
 from silo_server.db.transaction import Tx
 from silo_server.values import Item, Line
 
@@ -48,13 +48,15 @@ def conflicts_in(tx: Tx, parent_ids: Collection[int] | None = None) -> dict[int,
         collection.since,
         line.quantity,
         line.unit,
+        items.c.unit,
     )
-    query = query.outerjoin_from(bom_conflicts, bom_lines, whose).where(~collection.accepted)
+    query = query.outerjoin_from(bom_conflicts, bom_lines, whose)
+    query = query.outerjoin(items, items.c.id == collection.child_id).where(~collection.accepted)
     if parent_ids is not None:
         query = query.where(one_of(tx, collection.parent_id, parent_ids))
     conflicts: dict[int, CadQuantities] = {}
-    for parent_id, child_id, cad_quantity, since, quantity, unit in tx.conn.execute(query):
-        if quantity is not None and not _says_the_same(cad_quantity, quantity, unit):
+    for parent_id, child_id, cad_quantity, since, quantity, unit, of_item in tx.conn.execute(query):
+        if quantity is not None and not _says_the_same(cad_quantity, quantity, unit, of_item):
             conflicts.setdefault(parent_id, {})[child_id] = CadQuantity(cad_quantity, since)
     return conflicts
 

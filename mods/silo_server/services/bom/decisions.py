@@ -13,7 +13,7 @@ from enum import StrEnum
 from sqlalchemy import update
 
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError, VersionConflictError
-from silo.bom.quantities import counts_pieces
+from silo.bom.units import counts_pieces
 from silo_server.db.tables import bom_conflicts
 from silo_server.db.transaction import Tx
 from silo_server.errors import LinesChangedError
@@ -25,6 +25,7 @@ from silo_server.services.bom.change import (
     parent_to_change,
 )
 from silo_server.services.bom.conflicts import CadQuantity, Conflict, open_conflicts
+from silo_server.services.bom.line_edit import owned_by_users
 from silo_server.services.bom.lines import LineId, component_of, lines_of
 from silo_server.services.bom.review import marks_of, review
 from silo_server.services.bom.waiting import conflicts_mark
@@ -113,7 +114,8 @@ def _decided(line: Line, decision: Decision, conflict: Conflict | None) -> LineS
     if decision.action is ReviewAction.KEEP:
         if state.unreferenced_since is None:
             raise RejectedError(f"{line.child_part_number} is not unreferenced; there is nothing to keep")
-        return replace(state, source="manual", unreferenced_since=None, reason=reason)
+        kept = replace(state, source="manual", unreferenced_since=None, reason=reason)
+        return owned_by_users(kept, state, line.child_unit)
     if conflict is None:
         raise RejectedError(f"{line.child_part_number} is not in conflict")
     if decision.action is ReviewAction.KEEP_SILO:

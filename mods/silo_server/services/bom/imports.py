@@ -22,6 +22,7 @@ from silo.bom.errors import InputError, RejectedError
 from silo.bom.headers import Heading, designators
 from silo.bom.numbers import whole_number
 from silo.bom.quantities import exact_sum
+from silo.bom.units import stored_unit
 from silo.tables.bom_rows import BOM, BomRow, BomRows, bom_rows
 from silo.tables.sheet import Layout
 from silo_server.db.rows import one_of
@@ -40,7 +41,7 @@ from silo_server.services.bom.change import (
 from silo_server.services.bom.cycles import check_no_cycle, find_rings
 from silo_server.services.bom.import_parts import PartRow, identified, new_item
 from silo_server.services.bom.import_plan import NOTHING, Allowed, ImportPlan, ImportRow, MissingLine
-from silo_server.services.bom.line_edit import check_state, edited_state
+from silo_server.services.bom.line_edit import check_state, edited_state, means_the_same_unit
 from silo_server.services.bom.lines import lines_of_many
 from silo_server.services.import_file import read_import
 from silo_server.services.items import by_ids, create_item, get_item
@@ -191,7 +192,7 @@ def _plan_row(
     before = line.state if line else None
     after = None
     if not problems:
-        after = _after(before, changes)
+        after = _after(line, changes)
         try:
             check_state(after)
         except RejectedError as error:
@@ -208,12 +209,11 @@ def _plan_row(
     return replace(base, status=status, before=before, after=after, child_id=child_id, line=line, new=new)
 
 
-def _after(before: LineState | None, changes: dict[str, Any]) -> LineState:
-    if before is None:
-        return LineState(**{"source": "manual", **changes})
-    return edited_state(
-        before, {name: value for name, value in changes.items() if not _as_written(before, name, value)}
-    )
+def _after(line: Line | None, changes: dict[str, Any]) -> LineState:
+    if line is None:
+        return LineState(**{"source": "manual", **changes, "unit": stored_unit(changes.get("unit"))})
+    new = {name: value for name, value in changes.items() if not _as_written(line, name, value)}
+    return edited_state(line.state, new, line.child_unit)
 
 
 def _by_part(lines: Iterable[Line]) -> dict[tuple[str, str], Line]:
@@ -333,9 +333,14 @@ def _add_up(file: _File) -> dict[int, int]:
     return added
 
 
-def _as_written(before: LineState, name: str, value: Any) -> bool:
-    """Compare a value of a file with the line's; a file drops spaces at the ends, and splits designators."""
-    value_before = getattr(before, name)
+def _as_written(line: Line, name: str, value: Any) -> bool:
+    """Compare a value of a file with the line's; a file drops spaces at the ends, and splits designators.
+
+    Another spelling of the line's unit, or the unit that it has without a word, is no change.
+    """
+    value_before = getattr(line.state, name)
+    if name == "unit" and means_the_same_unit(line.state, value, line.child_unit):
+        return True
     if name == "reference_designators":
         return bool(designators(" ".join(value_before)) == value)
     return isinstance(value_before, str) and value_before.strip() == (value or "")

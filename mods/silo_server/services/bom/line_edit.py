@@ -9,8 +9,9 @@ from typing import Any
 
 from silo.api.wire import LineTexts
 from silo.bom.errors import RejectedError
-from silo.bom.quantities import counts_pieces, plain, same_quantity
+from silo.bom.quantities import plain, same_quantity
 from silo.bom.text import character_problem
+from silo.bom.units import PIECES, counts_pieces, line_unit, stored_unit
 from silo_server.db.transaction import Tx
 from silo_server.errors import DuplicateError, LinesChangedError
 from silo_server.schema import text_hints
@@ -58,6 +59,7 @@ def add_line(
     """Add a line. Raises DuplicateError if the BOM has the child already, CycleError, RejectedError."""
     parent = parent_to_change(tx, part_number, expected)
     child = get_item(tx, child_part_number)
+    state = replace(state, unit=stored_unit(state.unit))
     check_state(state)
     for line in lines_of(tx, parent):
         if line.child_id == child.id and line.state.rel_type == state.rel_type:
@@ -88,7 +90,7 @@ def change_line(
     parent = parent_to_change(tx, part_number, expected)
     lines = lines_of(tx, parent)
     line = line_of(lines, which, parent)
-    after = edited_state(line.state, changes)
+    after = edited_state(line.state, changes, line.child_unit)
     check_state(after)
     if after == line.state:
         return Edited(parent, line, parent.bom_version, 0, line.child_part_number)
@@ -97,7 +99,7 @@ def change_line(
         (other.child_id, other.state.rel_type) == (line.child_id, after.rel_type) for other in lines
     ):
         raise DuplicateError(f"{child} is in this BOM as {after.rel_type} already")
-    fields = sorted(k for k in changes if getattr(after, k) != getattr(line.state, k))
+    fields = sorted(k for k in {*changes, "unit"} if getattr(after, k) != getattr(line.state, k))
     if not same_quantity(after.quantity, line.state.quantity):
         quantity = f"quantity {plain(line.state.quantity)} → {plain(after.quantity)}"
         fields = [quantity, *(name for name in fields if name != "quantity")]
@@ -128,17 +130,22 @@ def remove_line(
     return _apply(tx, parent, change, line.child_part_number, f"{line.child_part_number} removed", why)
 
 
-def edited_state(before: LineState, changes: Mapping[str, Any]) -> LineState:
-    """Apply a person's edit to a state; pure, so that the import's preview gives the same result."""
+def edited_state(before: LineState, changes: Mapping[str, Any], child_unit: str | None = None) -> LineState:
+    """Apply a user's edit to a state; pure, so that the import's preview gives the same result.
+
+    child_unit
+        the unit of the line's child, in which a line without a unit is, unless CAD counted it.
+    """
     after = replace(before, **changes)
+    after = replace(after, unit=stored_unit(after.unit))
+    same_unit = means_the_same_unit(before, after.unit, child_unit)
     if "source" in changes:
         if after.source == "assembly":
             return replace(after, override=False, cad_quantity=None, reason=None)
-        return replace(after, unreferenced_since=None)
-    pieces = counts_pieces(after.unit)
-    same_unit = after.unit == before.unit or (pieces and counts_pieces(before.unit))
+        return replace(owned_by_users(after, before, child_unit), unreferenced_since=None)
     if same_unit and same_quantity(after.quantity, before.quantity):
         return after
+    pieces = counts_pieces(after.unit, child_unit)
     if before.override and pieces and same_quantity(after.quantity, before.cad_quantity):
         return replace(after, source="assembly", override=False, cad_quantity=None)
     if before.source == "assembly":
@@ -146,6 +153,23 @@ def edited_state(before: LineState, changes: Mapping[str, Any]) -> LineState:
             after, source="manual", override=True, cad_quantity=before.quantity, unreferenced_since=None
         )
     return after
+
+
+def means_the_same_unit(before: LineState, unit: str | None, child_unit: str | None) -> bool:
+    """Return True if a line with this unit in the place of its own would say the same."""
+    from_cad = before.source == "assembly"
+    return line_unit(unit, child_unit, from_cad=from_cad) == line_unit(
+        before.unit, child_unit, from_cad=from_cad
+    )
+
+
+def owned_by_users(after: LineState, before: LineState, child_unit: str | None) -> LineState:
+    """Name the unit of a line that CAD counted, and that users own from now on, where none is named.
+
+    Without a name its pieces would become metres if its part is counted in metres.
+    """
+    counted = before.source == "assembly" and after.unit is None
+    return after if not counted or counts_pieces(None, child_unit) else replace(after, unit=PIECES.symbol)
 
 
 def check_state(state: LineState) -> None:

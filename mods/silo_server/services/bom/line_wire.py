@@ -7,6 +7,7 @@ from typing import Any
 
 from silo.bom.quantities import plain
 from silo_server.fields import to_wire
+from silo_server.services.product.amounts import unit_is_open
 from silo_server.values import Line, LineState
 
 
@@ -21,6 +22,7 @@ def line_to_wire(line: Line, parent_part_number: str) -> dict[str, Any]:
         **child_to_wire(line),
         **line_state_to_wire(line.state),
         **revisions_to_wire(line),
+        "unit_open": unit_is_open(line),
     }
 
 
@@ -33,6 +35,7 @@ def child_to_wire(line: Line) -> dict[str, Any]:
         "child_description": line.child_description,
         "child_item_type": line.child_item_type,
         "child_archived": line.child_archived,
+        "child_unit": line.child_unit,
     }
 
 

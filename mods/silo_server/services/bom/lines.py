@@ -42,6 +42,7 @@ def select_lines(*, bare: bool = False) -> Select[*tuple[Any, ...]]:
         items.c.item_type,
         items.c.current_revision,
         items.c.archived_at,
+        items.c.unit,
         *STATE_COLUMNS,
     ).join(items, items.c.id == bom_lines.c.child_id)
 
@@ -51,12 +52,12 @@ def to_line(row: Any, child: tuple[Any, ...] = ()) -> Line:
 
     ``child``: the same child as read from another row (:func:`child_of`).
     """
-    return Line._make((*row[:4], *(child or child_of(row)), _state(*row[11:])))
+    return Line._make((*row[:4], *(child or child_of(row)), _state(*row[12:])))
 
 
 def child_of(row: Any) -> tuple[Any, ...]:
     """Return the values of a row of :func:`select_lines` that describe the child."""
-    return (*row[4:10], row[10] is not None)
+    return (*row[4:10], row[10] is not None, row[11] or None)
 
 
 # Most lines of a BOM are in one of a few states (so many pieces, from the assembly, nothing noted); a frozen

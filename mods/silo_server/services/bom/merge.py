@@ -217,6 +217,7 @@ def _as_mapping(line: Line) -> dict[str, Any]:
         "quantity": state.quantity,
         "source": state.source,
         "unit": state.unit,
+        "child_unit": line.child_unit,
         "rel_type": state.rel_type,
         "unreferenced_since": state.unreferenced_since,
     }
@@ -226,7 +227,7 @@ def _overrides_gone(lines: Sequence[Line], numbers: set[str]) -> list[QuantityCh
     # A person changed a quantity of a CAD line; now the assembly no longer has it. The line is theirs, so it
     # stays, but silence would leave a part in the BOM that nobody needs.
     return [
-        QuantityChange(line.child_part_number, 0.0, line.state.quantity, line.state.unit or "")
+        QuantityChange(line.child_part_number, 0.0, line.state.quantity, line.unit or "")
         for line in lines
         if line.state.override and line.child_part_number not in numbers
     ]

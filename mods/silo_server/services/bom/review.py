@@ -12,18 +12,24 @@ from silo_server.services.bom.history import Change, last_merge
 from silo_server.services.bom.line_state import mark_of
 from silo_server.services.bom.lines import lines_of
 from silo_server.services.items import get_item
+from silo_server.services.product.amounts import unit_is_open
 from silo_server.values import Item, Line
 
 
 @dataclass(frozen=True, slots=True)
 class Review:
-    """What is open on a BOM, and all its lines."""
+    """What is open on a BOM, and all its lines.
+
+    units
+        lines in a unit of another kind than their part's.
+    """
 
     parent: Item
     lines: Sequence[Line]
     unreferenced: Sequence[Line]
     conflicts: Sequence[Conflict]
     last_merge: Change | None
+    units: Sequence[Line] = ()
 
 
 def review(tx: Tx, part_number: str) -> Review:
@@ -36,6 +42,7 @@ def review(tx: Tx, part_number: str) -> Review:
         [line for line in lines if line.state.unreferenced_since],
         open_conflicts(tx, parent, lines),
         last_merge(tx, parent),
+        [line for line in lines if unit_is_open(line)],
     )
 
 

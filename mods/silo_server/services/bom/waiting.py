@@ -16,8 +16,18 @@ from typing import NamedTuple
 from sqlalchemy import ColumnElement, func, or_, select, text, true, union
 
 from silo.bom.left_out import Reason
+from silo.bom.units import PIECES, line_unit, unit_of
 from silo_server.db.rows import one_of
-from silo_server.db.tables import INCOMPLETE, UNREFERENCED, assignees, bom_last_syncs, bom_lines, items, users
+from silo_server.db.tables import (
+    INCOMPLETE,
+    UNREFERENCED,
+    WITH_UNIT,
+    assignees,
+    bom_last_syncs,
+    bom_lines,
+    items,
+    users,
+)
 from silo_server.db.transaction import Tx
 from silo_server.services.bom.conflicts import CadQuantities, conflicts_in
 
@@ -27,6 +37,8 @@ class Waiting(NamedTuple):
 
     cad_quantities
         CAD's quantities in its conflicts, by the child's internal id.
+    units
+        how many lines have a unit of another kind than their part's.
     """
 
     item_id: int
@@ -41,6 +53,7 @@ class Waiting(NamedTuple):
     unreferenced: int
     left_out: int
     unregistered: int
+    units: int
 
     @property
     def conflicts(self) -> int:
@@ -59,6 +72,7 @@ def waiting(tx: Tx) -> list[Waiting]:
     Reads only what a list of them is filtered and sorted by: there may be thousands.
     """
     unreferenced, conflicts, gaps = _unreferenced(tx), conflicts_in(tx), _gaps(tx)
+    units = _units(tx)
     row, last, none = items.c, bom_last_syncs.c, CadQuantities()
     shown = (row.id, row.part_number, row.name, row.bom_version, last.folder, last.document_file, last.at)
     query = (
@@ -66,7 +80,7 @@ def waiting(tx: Tx) -> list[Waiting]:
         .outerjoin_from(items, bom_last_syncs, last.parent_id == row.id)
         .outerjoin(assignees, assignees.c.item_id == row.id)
         .outerjoin(users, users.c.id == assignees.c.user_id)
-        .where(one_of(tx, row.id, {*unreferenced, *conflicts, *gaps}), row.archived_at.is_(None))
+        .where(one_of(tx, row.id, {*unreferenced, *conflicts, *gaps, *units}), row.archived_at.is_(None))
     )
     waitings = [
         Waiting(
@@ -76,6 +90,7 @@ def waiting(tx: Tx) -> list[Waiting]:
                 who or "",
                 unreferenced[record],
                 *gaps.get(record, (0, 0)),
+                units[record],
             ),
         )
         for record, number, name, version, folder, file, at, who in tx.conn.execute(query)
@@ -104,7 +119,8 @@ def _count(tx: Tx, which: Callable[[ColumnElement[int]], ColumnElement[bool]]) -
     unreferenced = select(bom_lines.c.parent_id).where(text(f"bom_lines.{UNREFERENCED}"))
     incomplete = select(bom_last_syncs.c.parent_id).where(text(f"({INCOMPLETE})"))
     disputed = select(items.c.id).where(one_of(tx, items.c.id, conflicts_in(tx)))
-    parent_id = union(unreferenced, incomplete, disputed).subquery().c.parent_id
+    in_units = select(items.c.id).where(one_of(tx, items.c.id, _units(tx)))
+    parent_id = union(unreferenced, incomplete, disputed, in_units).subquery().c.parent_id
     # Archived items are few: PostgreSQL reads all items, for each page, if asked which of these are not.
     archived = select(items.c.id).where(items.c.archived_at.is_not(None))
     return (
@@ -122,6 +138,22 @@ def conflicts_mark(version: int, conflicts: CadQuantities) -> str:
 def _unreferenced(tx: Tx) -> Counter[int]:
     query = select(bom_lines.c.parent_id, func.count()).where(text(f"bom_lines.{UNREFERENCED}"))
     return Counter({row[0]: row[1] for row in tx.conn.execute(query.group_by(bom_lines.c.parent_id))})
+
+
+def _units(tx: Tx) -> Counter[int]:
+    """Count the lines of each BOM whose unit is of another kind than their part's."""
+    line, row = bom_lines.c, items.c
+    shown = select(line.parent_id, line.unit, row.unit, line.source).join(items, row.id == line.child_id)
+    of_lines = shown.where(
+        text(f"bom_lines.{WITH_UNIT}"), line.unit != func.coalesce(func.nullif(row.unit, ""), PIECES.symbol)
+    )
+    of_items = shown.where(text(f"items.{WITH_UNIT}"), line.unit.is_(None), line.source == "assembly")
+    counts: Counter[int] = Counter()
+    for parent_id, unit, of_item, source in (*tx.conn.execute(of_lines), *tx.conn.execute(of_items)):
+        counts[parent_id] += not line_unit(unit, of_item, from_cad=source == "assembly").converts_to(
+            unit_of(of_item)
+        )
+    return +counts
 
 
 def _gaps(tx: Tx) -> dict[int, tuple[int, int]]:

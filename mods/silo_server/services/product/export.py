@@ -18,13 +18,13 @@ from silo.bom.quantities import as_decimal, plain
 from silo_server.db.transaction import Tx
 from silo_server.services.bom.last_sync import in_sentences, last_syncs
 from silo_server.services.items import get_item
-from silo_server.services.product.amounts import Exact
+from silo_server.services.product.amounts import Exact, product
 from silo_server.services.product.flat import flatten
 from silo_server.services.product.frozen import changes_of, frozen_product
 from silo_server.services.product.graph import MAX_DEPTH, load_graph
 from silo_server.services.product.line_filter import found_below, leading_to, sought
 from silo_server.services.product.parts import RolledItem, portions, some_parts
-from silo_server.services.product.summary import MassAndCost, OpenBom, Summary
+from silo_server.services.product.summary import MassAndCost, OpenBom, Summary, in_unit_of
 from silo_server.services.product.summary_make import own_worth
 from silo_server.services.product.summary_read import summaries, summary_of
 from silo_server.services.product.tree import Occurrence, expand
@@ -135,10 +135,13 @@ def export(
         for portion in portions(bare):
             parts = frozen.parts if frozen else some_parts(tx, {cells.line.child_id for cells in portion})
             for cells in portion:
-                child, amount = cells.line.child_id, cells.total * pieces
+                child = cells.line.child_id
+                amount = None if cells.total is None else product(cells.total, pieces)
                 part, summary, bom = parts[child], summed.get(child), open_boms.get(child)
                 worth = summary.as_part if summary else own_worth(part.properties)
                 worth = frozen.worths[child] if frozen else worth
+                if view is not View.FLAT:
+                    worth = in_unit_of(cells.line, worth)
                 fields = {"Incomplete": bom.incomplete or None if bom else None}
                 fields["Open"] = ", ".join(cells.doubts) or None
                 fields[PICTURE] = part.thumbnail_key
@@ -152,7 +155,9 @@ def export(
     if view is View.FLAT:
         flat = enumerate((row for row in flatten(graph) if fitting(row.line)), start=1)
         bare = (
-            _BareColumns(row.line, str(place), 1, row.total * pieces, row.total, row.doubts(pieces))
+            _BareColumns(
+                row.line, str(place), 1, product(row.total, pieces), row.total, row.doubts(pieces), row.unit
+            )
             for place, row in flat
         )
     else:
@@ -166,6 +171,7 @@ def export(
                 occurrence.line.state.quantity,
                 occurrence.total,
                 graph.doubts(occurrence.line),
+                occurrence.line.unit,
             )
             for occurrence, item in _numbered(expand(graph, depth, tx.settings.max_expanded_rows))
             if hit(occurrence.line)
@@ -174,14 +180,19 @@ def export(
 
 
 class _BareColumns(NamedTuple):
-    """A row before it has what it shows of its part: the line, its place, and what is open about it."""
+    """A row before it has what it shows of its part: the line, its place, and what is open about it.
+
+    total
+        of one root, in ``unit``; None below a line whose unit is open.
+    """
 
     line: Line
     item: str
     level: int
     quantity: Exact | float
-    total: Exact
+    total: Exact | None
     doubts: Sequence[str]
+    unit: str | None
 
 
 _CHANGES = {"what": "What", "within": "In", "part_number": "Part number", "name": "Name"}
@@ -198,9 +209,11 @@ def export_changes(tx: Tx, part_number: str, since: str, until: str) -> Export:
     return Export(root, View.INDENTED, rows, notes, columns=tuple(_CHANGES.values()))
 
 
-def _values(worth: MassAndCost, amount: Exact) -> Row:
+def _values(worth: MassAndCost, amount: Exact | None) -> Row:
     """Return mass and cost, of one and of all, if nothing of them is unknown and there is one currency."""
     row: Row = {}
+    if amount is None:
+        return row
     count = as_decimal(amount)
     if worth.mass is not None and worth.mass_whole:
         row |= {"Unit mass [kg]": plain(worth.mass), "Overall mass [kg]": plain(worth.mass * count)}
@@ -225,7 +238,7 @@ def _gap_rows(tx: Tx, root: Item, open_ones: Mapping[int, OpenBom], view: View) 
     ]
 
 
-def _row(bare: _BareColumns, part: RolledItem, amount: Exact, *, of_a_line: bool) -> Row:
+def _row(bare: _BareColumns, part: RolledItem, amount: Exact | None, *, of_a_line: bool) -> Row:
     """Return the cells of a row. Not ``of_a_line``: without cells of a line, as a part may have several."""
     line, state, properties = bare.line, bare.line.state, part.properties
     row: Row = {
@@ -236,7 +249,7 @@ def _row(bare: _BareColumns, part: RolledItem, amount: Exact, *, of_a_line: bool
         "Description": part.description,
         "Item type": line.child_item_type,
         "Quantity": plain(bare.quantity),
-        "Unit": state.unit,
+        "Unit": bare.unit,
         "Total quantity": plain(amount),
         "Bought": "yes" if part.is_bought else None,
     }

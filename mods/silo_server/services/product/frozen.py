@@ -107,7 +107,7 @@ def _record(
         "description": item.description,
         "item_type": item.item_type,
         "category": item.category,
-        **item.texts,
+        **{name: value for name, value in item.texts.items() if name != "unit" or value},
         "properties": dict(item.properties),
         # Only if there are any: so older records keep their hash.
         **({"supplier_parts": item.supplier_parts} if item.supplier_parts else {}),
@@ -198,6 +198,7 @@ def frozen_product(tx: Tx, item: Item, release: Release) -> ProductContent:
                     of.item_type,
                     of.current_revision,
                     False,
+                    of.texts.get("unit"),
                     stored_state(dumps(written["state"])),
                 )
             )

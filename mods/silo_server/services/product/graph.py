@@ -21,6 +21,7 @@ from silo_server.db.transaction import Tx
 from silo_server.errors import TooLargeError
 from silo_server.services.bom.conflicts import CadQuantities, cad_quantity_of, conflicts_in
 from silo_server.services.bom.lines import child_of, select_lines, to_line
+from silo_server.services.product.amounts import UNIT_OPEN, unit_is_open
 from silo_server.values import Item, Line
 
 MAX_DEPTH = 20
@@ -45,7 +46,7 @@ class Graph:
         doubts = ["unreferenced"] if line.state.unreferenced_since else []
         if quantity is not None:
             doubts.append(f"CAD says {plain(quantity)}" if quantity else "CAD no longer has it")
-        return doubts
+        return [*doubts, UNIT_OPEN] if unit_is_open(line) else doubts
 
     def names(self) -> dict[int, str]:
         """Return internal id → part number of the root and of all items below it."""

@@ -12,7 +12,6 @@ from decimal import Decimal
 from typing import NamedTuple
 
 from silo.bom.quantities import exact_product, exact_sum, plain
-from silo_server.services.product.amounts import Exact, checked_total
 from silo_server.services.product.flat import FlatRow
 from silo_server.services.product.parts import RolledItem, currency_of, positive_number
 
@@ -47,6 +46,7 @@ class MassLine(NamedTuple):
     part_number: str
     name: str
     total_quantity: float
+    unit: str | None
     mass_kg: float | None
     total_mass_kg: float | None
     is_assembly: bool = False
@@ -63,20 +63,20 @@ class MassRollup:
 
 def roll_up_cost(flat: Iterable[FlatRow], parts: Mapping[int, RolledItem]) -> CostRollup:
     """Add up the cost of the flat BOM from the parts' ``standard_cost``, per currency."""
-    rows, costs, missing = [], dict[str, list[Decimal]](), []
+    rows, costs, missing = [], dict[str, list[Decimal]](), dict[str, None]()
     for row in flat:
         item = parts[row.line.child_id]
         cost, currency, total = positive_number(item.properties, "standard_cost"), None, None
-        if cost is None:
-            missing.append(item.part_number)
-        else:
+        if cost is None or row.unit_open:
+            missing[item.part_number] = None
+        if cost is not None and row.total:
             currency = currency_of(item.properties)
             exact = exact_product((cost, row.total))
             costs.setdefault(currency, []).append(exact)
             total = float(exact)
         rows.append(CostRow(item.part_number, item.name, plain(row.total), row.unit, cost, currency, total))
     totals = {currency: float(exact_sum(of_it)) for currency, of_it in costs.items()}
-    return CostRollup(rows, totals, missing)
+    return CostRollup(rows, totals, list(missing))
 
 
 def roll_up_mass(
@@ -86,19 +86,17 @@ def roll_up_mass(
 
     These assemblies are leaves of the flat BOM as well.
     """
-    amounts: dict[int, Exact] = {}
+    rows, masses, missing = [], list[Decimal](), []
     for row in flat:
-        item_id = row.line.child_id
-        amounts[item_id] = checked_total(amounts.get(item_id, 0) + row.total, row.line)
-    rows = [_mass_row(parts[part_id], amount, part_id in assemblies) for part_id, amount in amounts.items()]
-    return MassRollup(
-        rows,
-        float(exact_sum(row.total_mass_kg for row in rows if row.total_mass_kg is not None)),
-        [row.part_number for row in rows if row.total_mass_kg is None],
-    )
-
-
-def _mass_row(item: RolledItem, amount: Exact, is_assembly: bool) -> MassLine:
-    mass = positive_number(item.properties, "mass_kg")
-    total = float(exact_product((mass, amount))) if mass is not None else None
-    return MassLine(item.part_number, item.name, plain(amount), mass, total, is_assembly)
+        item, total = parts[row.line.child_id], None
+        mass = positive_number(item.properties, "mass_kg")
+        if mass is None or row.unit_open:
+            missing.append(item.part_number)
+        if mass is not None and row.total:
+            masses.append(exact_product((mass, row.total)))
+            total = float(masses[-1])
+        is_assembly = row.line.child_id in assemblies
+        rows.append(
+            MassLine(item.part_number, item.name, plain(row.total), row.unit, mass, total, is_assembly)
+        )
+    return MassRollup(rows, float(exact_sum(masses)), missing)

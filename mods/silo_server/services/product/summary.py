@@ -3,9 +3,10 @@
 
 Every view, export and answer shows it and counts nothing itself.
 
-Mass: each leaf's ``mass_kg`` [kg] times its total quantity. If something below a sub-assembly has no mass but
-the sub-assembly states ``mass_kg``, that stands for the whole of it. Cost: each leaf's ``standard_cost``, per
-``currency``.
+A line in a unit of another kind than its part's is open: it counts in no sum, and what it holds is without a
+value. Mass: each leaf's ``mass_kg`` [kg] times its total quantity. If something below a sub-assembly has no
+mass but the sub-assembly states ``mass_kg``, that stands for the whole of it. Cost: each leaf's
+``standard_cost``, per ``currency``.
 """
 
 from __future__ import annotations
@@ -16,21 +17,30 @@ from decimal import Decimal
 from typing import NamedTuple
 
 from silo.bom.errors import counted
+from silo.bom.quantities import exact_product
+from silo_server.services.product.amounts import UNIT_OPEN, of_one
+from silo_server.values import Line
 
 
 class OpenBom(NamedTuple):
-    """What is open in one BOM: lines that CAD no longer has, conflicts, and what its last sync left out."""
+    """What is open in one BOM: lines that CAD no longer has, conflicts, what its last sync left out.
+
+    units
+        lines in a unit of another kind than their part's.
+    """
 
     part_number: str
     unreferenced: int = 0
     conflicts: int = 0
     incomplete: str = ""
+    units: int = 0
 
     @property
     def questions(self) -> str:
         """Count what a person has to decide there, in words."""
         counts = ((self.unreferenced, "unreferenced line"), (self.conflicts, "conflict"))
-        return ", ".join(counted(count, word) for count, word in counts if count)
+        words = [counted(count, word) for count, word in counts if count]
+        return ", ".join([*words, f"{UNIT_OPEN} on {counted(self.units, 'line')}"] if self.units else words)
 
     @property
     def words(self) -> str:
@@ -48,6 +58,21 @@ class MassAndCost(NamedTuple):
     mass_whole: bool
     costs: Mapping[str, Decimal]
     cost_whole: bool
+
+
+NOTHING_KNOWN = MassAndCost(None, mass_whole=False, costs={}, cost_whole=False)
+
+
+def in_unit_of(line: Line, worth: MassAndCost) -> MassAndCost:
+    """Return what one unit of a line weighs and costs, from what one unit of its child does."""
+    if line.state.unit is None and line.child_unit is None:
+        return worth
+    one = of_one(line)
+    if one is None:
+        return NOTHING_KNOWN
+    mass = None if worth.mass is None else exact_product((worth.mass, one))
+    costs = {currency: exact_product((cost, one)) for currency, cost in worth.costs.items()}
+    return worth._replace(mass=mass, costs=costs)
 
 
 class LastChange(NamedTuple):
@@ -117,7 +142,7 @@ class Summary:
     @property
     def questions(self) -> int:
         """Count the lines that wait for a person."""
-        return sum(bom.unreferenced + bom.conflicts for bom in self.open.values())
+        return sum(bom.unreferenced + bom.conflicts + bom.units for bom in self.open.values())
 
     @property
     def incomplete(self) -> int:

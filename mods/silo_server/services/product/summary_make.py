@@ -25,6 +25,7 @@ from silo_server.fields import names_of
 from silo_server.services.bom.conflicts import conflicts_in
 from silo_server.services.bom.last_sync import NEVER, last_syncs
 from silo_server.services.bom.lines import select_lines, to_line
+from silo_server.services.product.amounts import amount_of, unit_is_open
 from silo_server.services.product.graph import MAX_DEPTH, children_first
 from silo_server.services.product.parts import currency_of, positive_number
 from silo_server.services.product.summary import LastChange, MassAndCost, OpenBom, Summary
@@ -42,6 +43,10 @@ class Node(NamedTuple):
         of the leaf parts, or its own if it is a leaf; ``no_mass`` and ``no_cost`` are those without a value.
     assemblies
         of what has a BOM, itself included → [its lines, those of them that name an older revision].
+    weighed
+        of what its mass is made of: the leaf parts, and assemblies that state their mass for all in them.
+    first_parts, first_weighed
+        the first part numbers of ``parts`` and ``weighed``.
     """
 
     summary: Summary
@@ -49,6 +54,9 @@ class Node(NamedTuple):
     no_mass: Set[int]
     no_cost: Set[int]
     assemblies: Mapping[int, Sequence[int]]
+    weighed: Set[int]
+    first_parts: Sequence[str]
+    first_weighed: Sequence[str]
 
 
 class Built(NamedTuple):
@@ -175,7 +183,8 @@ def _open(tx: Tx, lines: Mapping[int, Sequence[Line]], own: Mapping[int, _Own]) 
         if not incomplete and last.at is None and not below:
             incomplete = "never synced"
         gone = sum(line.state.unreferenced_since is not None for line in below)
-        made = OpenBom(own[item_id].part_number, gone, len(conflicts.get(item_id, ())), incomplete)
+        units = sum(map(unit_is_open, below))
+        made = OpenBom(own[item_id].part_number, gone, len(conflicts.get(item_id, ())), incomplete, units)
         if made.words:
             boms[item_id] = made
     return boms
@@ -225,6 +234,11 @@ class _Maker:
         unweighed = [node for node in nodes if not node.summary.as_part.mass_whole]
         no_mass = (set() if worth.mass_whole else me).union(*(node.no_mass for node in unweighed))
         no_cost = (set() if worth.cost_whole else me).union(*(node.no_cost for node in nodes))
+        uncounted = [node for line, node in below if unit_is_open(line)]
+        no_mass = no_mass.union(*(node.weighed for node in uncounted))
+        no_cost = no_cost.union(*(node.parts for node in uncounted))
+        itself = {item_id} if states_all or me else set[int]()
+        weighed = itself or set[int]().union(*(node.weighed for node in nodes))
         assemblies = {part_id: counts for node in nodes for part_id, counts in node.assemblies.items()}
         older = sum(line.newer_revision_exists for line in lines)
         summary = Summary(
@@ -239,15 +253,27 @@ class _Maker:
             no_mass=len(no_mass),
             no_cost=len(no_cost),
             outdated=older + sum(counts[1] for counts in assemblies.values()),
-            mass_missing=_first(me & no_mass, own, (node.summary.mass_missing for node in unweighed)),
-            cost_missing=_first(me & no_cost, own, (node.summary.cost_missing for node in nodes)),
+            mass_missing=_first(
+                me & no_mass,
+                own,
+                *(node.summary.mass_missing for node in unweighed),
+                *(node.first_weighed for node in uncounted),
+            ),
+            cost_missing=_first(
+                me & no_cost,
+                own,
+                *(node.summary.cost_missing for node in nodes),
+                *(node.first_parts for node in uncounted),
+            ),
         )
         if lines or own.is_assembly:
             assemblies[item_id] = (len(lines), older)
-        return Node(summary, parts, no_mass, no_cost, assemblies)
+        first_parts = _first(me, own, *(node.first_parts for node in nodes))
+        first_weighed = _first(itself, own, *(() if itself else (node.first_weighed for node in nodes)))
+        return Node(summary, parts, no_mass, no_cost, assemblies, weighed, first_parts, first_weighed)
 
 
-def _first(me: Collection[int], own: _Own, below: Iterable[Sequence[str]]) -> list[str]:
+def _first(me: Collection[int], own: _Own, *below: Sequence[str]) -> list[str]:
     return sorted({*chain.from_iterable(below), *(own.part_number for _ in me)})[:MOST_NAMED]
 
 
@@ -255,13 +281,19 @@ def _sum_of(below: Sequence[tuple[Line, Node]]) -> MassAndCost:
     mass: Decimal | None = None
     costs: dict[str, Decimal] = {}
     parts = [node.summary.as_part for _, node in below]
+    counted = True
     for (line, _), worth in zip(below, parts, strict=True):
-        quantity = as_decimal(line.state.quantity)
+        if (quantity := amount_of(line)) is None:
+            counted = False
+            continue
         if worth.mass is not None:
             mass = exact_sum((mass or Decimal(0), exact_product((quantity, worth.mass))))
         for currency, cost in worth.costs.items():
             costs[currency] = exact_sum((costs.get(currency, Decimal(0)), exact_product((quantity, cost))))
-    whole = (all(worth.mass_whole for worth in parts), all(worth.cost_whole for worth in parts))
+    whole = (
+        counted and all(worth.mass_whole for worth in parts),
+        counted and all(worth.cost_whole for worth in parts),
+    )
     return MassAndCost(mass, whole[0], costs, whole[1])
 
 
@@ -273,10 +305,19 @@ def _levels(rows: int, below: Iterable[Sequence[int]]) -> list[int]:
 def _row(item_id: int, node: Node) -> dict[str, Any]:
     summary = {name: getattr(node.summary, name) for name in names_of(Summary)}
     sets = {name: sorted(getattr(node, name)) for name in ("parts", "no_mass", "no_cost")}
+    if node.weighed != node.parts:
+        sets["weighed"] = sorted(node.weighed)
     return {
         "item_id": item_id,
         "summary": json.dumps(summary, separators=(",", ":"), default=str),
-        "sets": dumps(sets | {"assemblies": node.assemblies}),
+        "sets": dumps(
+            sets
+            | {
+                "assemblies": node.assemblies,
+                "first_parts": node.first_parts,
+                "first_weighed": node.first_weighed,
+            }
+        ),
     }
 
 
@@ -295,4 +336,6 @@ def _node(row: Any) -> Node:
     sets = json.loads(row.sets)
     parts, no_mass, no_cost = (frozenset(sets[name]) for name in ("parts", "no_mass", "no_cost"))
     assemblies = {int(item_id): counts for item_id, counts in sets["assemblies"].items()}
-    return Node(stored_summary(row.summary), parts, no_mass, no_cost, assemblies)
+    weighed = frozenset(sets.get("weighed", parts))
+    firsts = (sets["first_parts"], sets["first_weighed"])
+    return Node(stored_summary(row.summary), parts, no_mass, no_cost, assemblies, weighed, *firsts)

@@ -7,18 +7,22 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from silo_server.errors import TooLargeError
-from silo_server.services.product.amounts import Exact, multiplied
+from silo_server.services.product.amounts import Exact, totals_of
 from silo_server.services.product.graph import Graph, order_of
 from silo_server.values import Line
 
 
 class Occurrence(NamedTuple):
-    """A line somewhere in the expanded tree. ``depth`` 1 = direct child; ``total`` per one root."""
+    """A line somewhere in the expanded tree. ``depth`` 1 = direct child.
+
+    total
+        per one root, in the unit of the line; None below a line whose unit is open.
+    """
 
     line: Line
     parent_part_number: str
     depth: int
-    total: Exact
+    total: Exact | None
 
 
 def expand(graph: Graph, depth: int, limit: int) -> Iterator[Occurrence]:
@@ -26,18 +30,18 @@ def expand(graph: Graph, depth: int, limit: int) -> Iterator[Occurrence]:
     order_of(graph)  # finds a cycle before it is walked
     count = 0
     graph_lines = graph.lines
-    exact: Exact = 1
+    exact: Exact | None = 1
     stack = [(graph.root.part_number, 1, exact, iter(graph_lines.get(graph.root.id, ())))]
     while stack:
         parent, level, factor, lines = stack[-1]
         for line in lines:
             state = line.state
-            total = multiplied(factor, line)
+            total, amount = totals_of(factor, line)
             count += 1
             yield Occurrence(line, parent, level, total)
             below = graph_lines.get(line.child_id)
             if below and level < depth and state.rel_type == "component":
-                stack.append((line.child_part_number, level + 1, total, iter(below)))
+                stack.append((line.child_part_number, level + 1, amount, iter(below)))
                 break
         else:
             stack.pop()
