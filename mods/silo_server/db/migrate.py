@@ -645,9 +645,9 @@ def _units(op: Operations) -> None:
     lines, parents = tables["bom_lines"], tables["items"]
     query = select(lines.c.unit, parents.c.part_number).join(parents, parents.c.id == lines.c.parent_id)
     unknown: dict[str, set[str]] = {}
-    for spelling, number in bind.execute(query.where(lines.c.unit.is_not(None))).all():
-        if known_unit(spelling) is None:
-            unknown.setdefault(spelling, set()).add(number)
+    for row in bind.execute(query.where(lines.c.unit.is_not(None))).all():
+        if known_unit(row.unit) is None:
+            unknown.setdefault(row.unit, set()).add(row.part_number)
     for unit, numbers in sorted(unknown.items()):
         _log.warning(
             "the unit %r is none that we know; lines of %s have it", unit, listed(sorted(numbers), 20)

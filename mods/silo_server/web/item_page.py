@@ -34,7 +34,7 @@ from silo_server.services.documents import documents_holding, get_document
 from silo_server.services.following import is_followed
 from silo_server.services.items import ItemQuery, get_item, list_items
 from silo_server.services.looks import last_look
-from silo_server.services.product.amounts import Exact, product, totals_of
+from silo_server.services.product.amounts import UNIT_OPEN, Exact, product, totals_of
 from silo_server.services.product.flat import FlatRow, flatten, leaves_in
 from silo_server.services.product.graph import MAX_DEPTH, Graph, load_graph
 from silo_server.services.product.line_filter import found_parts, leading_to, sought
@@ -236,7 +236,10 @@ class ShownStructure:
         def dress(row: StructureRow, doubts: Sequence[str]) -> Branch:
             child = row.line.child_id
             part, worth, summary = known[child]
-            worth = worth if row.flat else in_unit_of(row.line, worth)
+            if not row.flat:
+                worth = in_unit_of(row.line, worth)
+            elif UNIT_OPEN in doubts:
+                worth = worth._replace(mass_whole=False, cost_whole=False)
             if summary is None:
                 return Branch(row.line, part, row.depth, row.total, row.unit, worth, doubts)
             marks = [*summary.inside(child, is_open=row.is_open), *doubts]

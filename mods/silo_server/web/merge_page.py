@@ -23,6 +23,7 @@ from silo.bom.errors import (
     SiloError,
 )
 from silo.bom.numbers import whole_number
+from silo.bom.units import PIECES
 from silo_server.db.transaction import Tx
 from silo_server.errors import DuplicateError, LinesChangedError
 from silo_server.events import log
@@ -364,6 +365,7 @@ def _show(call: Call, part_number: str, asked: PageState, status: int = 200) -> 
         gaps=in_sentences(last.gaps),
         unreferenced=review_of.unreferenced,
         units=review_of.units,
+        pieces=PIECES.symbol,
         most_shown=MOST_SHOWN,
         most_forms=MOST_FORMS,
         conflicts=review_of.conflicts,

@@ -279,7 +279,7 @@ def _show(
 
 def _open_of(*rows: Waiting) -> list[str]:
     """Count what is open in these BOMs, by kind, in words."""
-    unreferenced, conflicts, left_out, unregistered = (
+    unreferenced, conflicts, left_out, unregistered, units = (
         sum(count(row) for row in rows) for _words, count in KINDS.values()
     )
     counts = {
@@ -287,6 +287,7 @@ def _open_of(*rows: Waiting) -> list[str]:
         plural(conflicts, "conflict"): conflicts,
         plural(left_out, "component left out", "components left out"): left_out,
         plural(unregistered, "unregistered part"): unregistered,
+        plural(units, "line with unit?", "lines with unit?"): units,
     }
     return [words for words, count in counts.items() if count]
 

@@ -18,7 +18,7 @@ from silo.bom.quantities import as_decimal, plain
 from silo_server.db.transaction import Tx
 from silo_server.services.bom.last_sync import in_sentences, last_syncs
 from silo_server.services.items import get_item
-from silo_server.services.product.amounts import Exact, product
+from silo_server.services.product.amounts import UNIT_OPEN, Exact, product
 from silo_server.services.product.flat import flatten
 from silo_server.services.product.frozen import changes_of, frozen_product
 from silo_server.services.product.graph import MAX_DEPTH, load_graph
@@ -142,6 +142,8 @@ def export(
                 worth = frozen.worths[child] if frozen else worth
                 if view is not View.FLAT:
                     worth = in_unit_of(cells.line, worth)
+                elif UNIT_OPEN in cells.doubts:
+                    worth = worth._replace(mass_whole=False, cost_whole=False)
                 fields = {"Incomplete": bom.incomplete or None if bom else None}
                 fields["Open"] = ", ".join(cells.doubts) or None
                 fields[PICTURE] = part.thumbnail_key
