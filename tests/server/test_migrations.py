@@ -106,14 +106,14 @@ def test_units_get_their_one_form_and_the_others_are_listed(
 ) -> None:
     """Of lines and in their history, so that the line is still as its last change left it."""
     db = Database(Settings(database_url=empty_url, files_dir=tmp_path))
-    upgrade(db, "0018")
+    upgrade(db, "0019")
     with db.write() as tx:
         fill(tx.conn)
         state = '{"quantity":2.5,"source":"manual","unit":"Stk.","notes":"ä"}'
         tx.conn.execute(text("UPDATE bom_lines SET unit = 'Stk.'"))
         tx.conn.execute(text("UPDATE bom_change_lines SET before = NULL, after = :state"), {"state": state})
         tx.conn.execute(text("UPDATE orders SET unit = 'Karton'"))
-    upgrade(db, "0019")
+    upgrade(db, "0020")
     with db.read() as tx:
         assert tx.conn.scalar(text("SELECT unit FROM bom_lines")) == "pcs"
         after = tx.conn.scalar(text("SELECT after FROM bom_change_lines"))
