@@ -130,7 +130,17 @@ READING_THREADS = 40
 
 def routers() -> tuple[APIRouter, ...]:
     """Import and return all routers; late, as this takes half of the import, and a backup needs none."""
-    from silo_server.routes import items, orders, releases, scene, sessions, streams, system, tokens
+    from silo_server.routes import (
+        items,
+        orders,
+        parts_table,
+        releases,
+        scene,
+        sessions,
+        streams,
+        system,
+        tokens,
+    )
     from silo_server.routes import users as user_routes
     from silo_server.routes.bom import changes, exports, history, imports, lines, merge, review, summary, tree
     from silo_server.web import pages
@@ -141,6 +151,7 @@ def routers() -> tuple[APIRouter, ...]:
         sessions.router,
         tokens.router,
         user_routes.router,
+        parts_table.router,
         items.router,
         items.revisions_router,
         items.by_uuid,

@@ -19,7 +19,7 @@ from silo_server.services.items import ItemQuery, NewItem, check_number, list_it
 
 
 @dataclass(frozen=True, slots=True)
-class PartRow:
+class IdentifiedRow:
     """A row with its part. ``unknown`` names a part that is not here, ``several`` says that a name has
     several.
     """
@@ -38,7 +38,7 @@ class PartRow:
     def quantity(self) -> Decimal | None:
         return self.of.quantity
 
-    def with_row(self, row: BomRow) -> PartRow:
+    def with_row(self, row: BomRow) -> IdentifiedRow:
         """Return the same part with another row."""
         return replace(self, of=row)
 
@@ -49,7 +49,7 @@ def name_of(texts: Mapping[str, str]) -> str:
     return texts.get("name") or (value if texts.get("value") else texts.get("description", ""))
 
 
-def identified(tx: Tx, rows: Sequence[BomRow]) -> list[PartRow]:
+def identified(tx: Tx, rows: Sequence[BomRow]) -> list[IdentifiedRow]:
     """Find the part of each row."""
     nameless = [row.texts for row in rows if not row.texts.get("part_number")]
     row, by_name, by_maker = items.c, dict[str, list[str]](), dict[str, list[str]]()
@@ -67,21 +67,23 @@ def identified(tx: Tx, rows: Sequence[BomRow]) -> list[PartRow]:
 
 def _identified(
     row: BomRow, by_name: Mapping[str, Sequence[str]], by_maker: Mapping[str, Sequence[str]]
-) -> PartRow:
+) -> IdentifiedRow:
     if number := row.texts.get("part_number"):
-        return PartRow(row, number)
+        return IdentifiedRow(row, number)
     maker, name = row.texts.get("manufacturer_part_number", ""), name_of(row.texts)
     if not (maker or name):
-        return PartRow(row)
+        return IdentifiedRow(row)
     same = by_maker[maker] if maker else by_name.get(name, [])
     if len(same) == 1:
-        return PartRow(row, same[0])
+        return IdentifiedRow(row, same[0])
     if same:
-        return PartRow(row, several=f"{maker or name}: {listed(same, 5)} are called so; give the part number")
-    return PartRow(row, unknown=maker or name)
+        return IdentifiedRow(
+            row, several=f"{maker or name}: {listed(same, 5)} are called so; give the part number"
+        )
+    return IdentifiedRow(row, unknown=maker or name)
 
 
-def new_item(part: PartRow, category: str, problems: list[str]) -> NewItem:
+def new_item(part: IdentifiedRow, category: str, problems: list[str]) -> NewItem:
     """Describe the new part of a row; it is bought if the row names a maker, a supplier or a value."""
     texts = part.of.texts
     facts = {role.value: texts[role] for role in BOUGHT if texts.get(role)}

@@ -39,7 +39,7 @@ from silo_server.services.bom.change import (
     new_line_id,
 )
 from silo_server.services.bom.cycles import check_no_cycle, find_rings
-from silo_server.services.bom.import_parts import PartRow, identified, new_item
+from silo_server.services.bom.import_parts import IdentifiedRow, identified, new_item
 from silo_server.services.bom.import_plan import NOTHING, Allowed, ImportPlan, ImportRow, MissingLine
 from silo_server.services.bom.line_edit import check_state, edited_state, means_the_same_unit
 from silo_server.services.bom.lines import lines_of_many
@@ -64,7 +64,7 @@ class _File:
     """The rows of a file and their assemblies; the parents and lines that Silo has of them."""
 
     product: Item
-    parts: list[PartRow]
+    parts: list[IdentifiedRow]
     parents: list[int | None]
     ids: Mapping[str, tuple[int, bool]]
     assemblies: Mapping[str, Item] = field(default_factory=dict)
