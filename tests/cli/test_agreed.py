@@ -41,6 +41,7 @@ WITH_PATHS = {
     "register": "register @ --yes",
     "log": "log @",
     "restore": "restore @ --verify",
+    "import": "import parts @",
     "inertia": "inertia @",
     "links": "links @",
     "mass": "mass @",
@@ -325,7 +326,7 @@ LOCAL = ("mass", "inertia", "links")
 ELSEWHERE = {
     *("serve", "backup", "restore", "summaries", "demo", "login", "logout", "install-addon", "completion"),
     "help",
-    *("schema", "bom-diff", "relink"),
+    *("schema", "bom-diff", "relink", "import"),
 }
 # Commands that read a file or ask a server, as docs/headless.md lists them.
 FAULTY = {

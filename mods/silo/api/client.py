@@ -28,6 +28,7 @@ from silo.api.events import SILENCE, HttpEventStream, open_stream
 from silo.api.items import ItemCalls
 from silo.api.policy import Retries
 from silo.api.sse import ServerEvent
+from silo.api.tables import TableCalls
 from silo.api.transport import ApiCall, Cancel, Timeouts, Transport, stop_if
 from silo.api.wire import ServerState, User, login_code
 from silo.bom.errors import SiloError
@@ -42,7 +43,7 @@ class BrowserLogin:
     code: str
 
 
-class SiloClient(ItemCalls, BomCalls):
+class SiloClient(ItemCalls, BomCalls, TableCalls):
     """A Silo server.
 
     base_url

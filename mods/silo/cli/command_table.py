@@ -54,6 +54,11 @@ THEMES = {
             "merge BOMs into the server; nothing is ever deleted, manual lines are never touched",
             "silo-mod sync vault/ --report night.md --report night.xml",
         ),
+        "import": (
+            "items.import_table",
+            "bring a BOM, a list of parts or a price list from a table (CSV, XLSX, ODS, XLS) into Silo",
+            "silo-mod import bom bom.xlsx --product A01-0001 --check",
+        ),
         "relink": (
             "files.relink",
             "let the links of an assembly and its sub-assemblies lead to a file that has moved",

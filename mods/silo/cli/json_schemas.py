@@ -389,6 +389,21 @@ LinkMap = _shape(
 )
 
 
+Imported = _shape(
+    "Imported",
+    doc="What became, or with ``--check`` would become, of each row of a table; ``items`` is that of prices.",
+    dry_run=bool,
+    counts=(dict[str, int], {}),
+    problems=(_many(str), []),
+    unused_columns=_many(str),
+    notes=_many(str),
+    missing=(_many(dict[str, str]), []),
+    removed=(int, 0),
+    left_out=(_many(dict[str, Any]), []),
+    rows=(_many(dict[str, Any]), []),
+    items=(_many(dict[str, Any]), []),
+)
+
 SHAPES: dict[str, Any] = {
     "bom": Bom | FolderBoms | Witnessed | _many(FlatLine),
     "diff": Comparison,
@@ -405,6 +420,7 @@ SHAPES: dict[str, Any] = {
     "search": _many(Found),
     "show": Shown,
     "order": OrderList,
+    "import": Imported,
     "whoami": Whoami,
     "logout": Logout,
     "serve": Greeting,

@@ -33,7 +33,8 @@ EACH = "all"
 _READ = "bom diff register sync where-used"
 
 _ASK = (
-    "bom diff register commit status sync queue pull search show order log watch whoami doctor inertia mass"
+    "bom diff register commit status sync queue pull search show order import log watch whoami doctor inertia"
+    " mass"
 )
 
 

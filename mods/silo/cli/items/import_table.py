@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""``silo-mod import``: a BOM, a list of parts or a price list from a table into Silo."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rich.text import Text
+
+from silo import spoken
+from silo.bom.errors import Exit, InputError
+from silo.cli.connection import client_of, named_item
+from silo.cli.json_output import print_json
+from silo.cli.options import add_options
+from silo.cli.terminal import console, plain, table_of
+
+KINDS = ("bom", "parts", "prices")
+# The parameters of the options, by the kind of table.
+_ASKED: Mapping[str, Mapping[str, str]] = {
+    "bom": {"make": "make", "add_up": "add_up", "quantities": "quantities", "remove": "remove"},
+    "parts": {"make": "category"},
+    "prices": {},
+}
+
+
+def add_import(parser: argparse.ArgumentParser) -> None:
+    """Add the command."""
+    parser.add_argument("kind", choices=KINDS, help="what the table is")
+    parser.add_argument("file", metavar="FILE", help="CSV, XLSX, ODS or XLS")
+    add_options(
+        parser,
+        {
+            "--product NUMBER": "bom: the part number of the assembly whose BOM this is",
+            "--check": "show what would become of each row; change nothing",
+            "--make CODE": "make unknown parts in this category (parts: those whose own category is unknown)",
+            "--add-up": "bom: add up the rows of one part",
+            "--quantities": "bom: the quantity counts where the designators name another number",
+            "--remove": "bom: remove the lines that the file does not have",
+        },
+    )
+
+
+def run_import(args: argparse.Namespace) -> int:
+    """Import the file, or show what would happen. 1 if rows have problems, or if something was left out."""
+    if (args.product is None) is (args.kind == "bom"):
+        raise InputError("--product names the assembly of a BOM: give it with bom, and with bom alone")
+    asked = {"dry_run": "true"} if args.check else {}
+    names = _ASKED[args.kind]
+    for option in _ASKED["bom"]:
+        value = getattr(args, option)
+        if value and option not in names:
+            raise InputError(f"--{option.replace('_', '-')} does nothing with {args.kind}")
+        if value:
+            asked[names[option]] = value if isinstance(value, str) else "true"
+    try:
+        data = Path(args.file).read_bytes()
+    except OSError as error:
+        raise InputError(f"{args.file!r} cannot be read: {error.strerror or error}") from error
+    with client_of(args) as client:
+        if args.kind == "bom":
+            answer = client.import_bom(named_item(client, args.product).part_number, data, **asked)
+        else:
+            answer = (client.import_parts if args.kind == "parts" else client.import_prices)(data, **asked)
+    if args.json:
+        print_json(answer)
+    else:
+        _print(args, answer)
+    return Exit.UNDONE if _is_incomplete(answer) else Exit.DONE
+
+
+def _is_incomplete(answer: Mapping[str, Any]) -> bool:
+    rows = answer.get("rows", answer.get("items", ()))
+    return bool(answer.get("left_out")) or any(row["status"] in ("error", "skip") for row in rows)
+
+
+def _print(args: argparse.Namespace, answer: Mapping[str, Any]) -> None:
+    out = console()
+    rows = answer.get("rows", answer.get("items", ()))
+    table = table_of("", "Row", "What", "Part number", "In words")
+    shown = [row for row in rows if row["status"] != "same"]
+    for row in shown:
+        words = [*row["problems"], row.get("why", ""), *_differences(row)]
+        place = str(row.get("row") or ", ".join(map(str, row.get("rows", ()))))
+        cells = (
+            place,
+            row["status"],
+            row["part_number"] or row.get("name", ""),
+            "; ".join(filter(None, words)),
+        )
+        table.add_row(*(Text(plain(cell)) for cell in cells))
+    if shown:
+        out.print(table)
+    counts = {status: sum(row["status"] == status for row in rows) for status in ("add", "change", "same")}
+    left_out = sum(row["status"] == "skip" for row in rows) + len(answer.get("left_out", ()))
+    wrong = sum(row["status"] == "error" for row in rows)
+    sentence = (
+        f"{counts['add']} added, {counts['change']} changed, {counts['same']} the same, {left_out} left out"
+    )
+    sentence += f", {wrong} with problems" if wrong else ""
+    out.print(Text(spoken(f"{sentence}. Nothing was written." if args.check else f"{sentence}.")))
+    missing = answer.get("missing", ())
+    if missing and not answer.get("removed"):
+        names = ", ".join(line["part_number"] for line in missing)
+        print(f"silo-mod: {plain(f'lines of Silo that the file does not have: {names}')}", file=sys.stderr)
+    if answer.get("unused_columns"):
+        names = ", ".join(answer["unused_columns"])
+        print(f"silo-mod: {plain(f'columns that are not used: {names}')}", file=sys.stderr)
+    for note in answer.get("notes", ()):
+        print(f"silo-mod: {plain(note)}", file=sys.stderr)
+
+
+def _differences(row: Mapping[str, Any]) -> list[str]:
+    """Describe the changes of a row: an item's columns, an item's suppliers, or a line's fields."""
+    changes = row.get("changes", ())
+    if isinstance(changes, Mapping):
+        return [f"{name}: {each['before'] or '–'} → {each['after']}" for name, each in changes.items()]
+    before, after = row.get("before"), row.get("after")
+    if before and after:
+        pairs = [(name, before.get(name), after[name]) for name in after]
+        return [f"{name}: {old} → {new}" for name, old, new in pairs if old != new]
+    if after:
+        return [f"{after['quantity']} {after.get('unit') or ''}".strip()]
+    return list(changes)
