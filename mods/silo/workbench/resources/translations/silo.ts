@@ -247,6 +247,53 @@
             <translation type="unfinished" />
         </message>
         <message>
+            <location filename="../../colleagues/states.py" />
+            <location filename="../../freecad/silo_group.py" />
+            <source>in Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../colleagues/states.py" />
+            <source>not in Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../colleagues/states.py" />
+            <source>edited since its commit</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../colleagues/states.py" />
+            <source>newer in Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../colleagues/states.py" />
+            <source>edited, and newer in Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../colleagues/states.py" />
+            <source>waits to be sent</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../colleagues/states.py" />
+            <location filename="../../../outbox/status_text.py" />
+            <source>held for your choice</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../colleagues/states.py" />
+            <source>the server was restored from a backup: it has an older one</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../colleagues/states.py" />
+            <source>its item is not on this server</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
             <location filename="../../colleagues/theirs.py" />
             <source>leave out</source>
             <translation type="unfinished" />
@@ -485,12 +532,27 @@
         </message>
         <message>
             <location filename="../../commit/flow.py" />
+            <source>Not all files below it are in Silo: {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>{n} sent, {same} the same in Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
             <source>It has no Silo part number yet, so it was not sent.</source>
             <translation type="unfinished" />
         </message>
         <message>
             <location filename="../../commit/flow.py" />
             <source>Saved, but not in Silo: {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/plan.py" />
+            <source>another program changed the file since it was opened: reload it, or commit yours over it</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -591,12 +653,6 @@
         <message>
             <location filename="../../freecad/loss_guard.py" />
             <source>Made by a newer FreeCAD: {name}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../freecad/silo_group.py" />
-            <location filename="../../revisions/project.py" />
-            <source>in Silo</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1965,47 +2021,6 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../revisions/ghosts.py" />
             <source>Not compared: {unknown} in groups and arrays without links.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../revisions/project.py" />
-            <source>not in Silo</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../revisions/project.py" />
-            <source>edited since its commit</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../revisions/project.py" />
-            <source>newer in Silo</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../revisions/project.py" />
-            <source>edited, and newer in Silo</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../revisions/project.py" />
-            <source>waits to be sent</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../revisions/project.py" />
-            <location filename="../../../outbox/status_text.py" />
-            <source>held for your choice</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../revisions/project.py" />
-            <source>the server was restored from a backup: it has an older one</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../revisions/project.py" />
-            <source>its item is not on this server</source>
             <translation type="unfinished" />
         </message>
         <message>

@@ -247,6 +247,53 @@
             <translation>[Silo] Die ersten {n} von {all} Objekten sind ausgewählt.</translation>
         </message>
         <message>
+            <location filename="../../colleagues/states.py" />
+            <location filename="../../freecad/silo_group.py" />
+            <source>in Silo</source>
+            <translation>in Silo</translation>
+        </message>
+        <message>
+            <location filename="../../colleagues/states.py" />
+            <source>not in Silo</source>
+            <translation>nicht in Silo</translation>
+        </message>
+        <message>
+            <location filename="../../colleagues/states.py" />
+            <source>edited since its commit</source>
+            <translation>seit dem Einchecken geändert</translation>
+        </message>
+        <message>
+            <location filename="../../colleagues/states.py" />
+            <source>newer in Silo</source>
+            <translation>neuer in Silo</translation>
+        </message>
+        <message>
+            <location filename="../../colleagues/states.py" />
+            <source>edited, and newer in Silo</source>
+            <translation>geändert, und neuer in Silo</translation>
+        </message>
+        <message>
+            <location filename="../../colleagues/states.py" />
+            <source>waits to be sent</source>
+            <translation>wartet auf das Senden</translation>
+        </message>
+        <message>
+            <location filename="../../colleagues/states.py" />
+            <location filename="../../../outbox/status_text.py" />
+            <source>held for your choice</source>
+            <translation>wartet auf Ihre Entscheidung</translation>
+        </message>
+        <message>
+            <location filename="../../colleagues/states.py" />
+            <source>the server was restored from a backup: it has an older one</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../colleagues/states.py" />
+            <source>its item is not on this server</source>
+            <translation>sein Artikel ist nicht auf diesem Server</translation>
+        </message>
+        <message>
             <location filename="../../colleagues/theirs.py" />
             <source>leave out</source>
             <translation>weglassen</translation>
@@ -485,6 +532,16 @@
         </message>
         <message>
             <location filename="../../commit/flow.py" />
+            <source>Not all files below it are in Silo: {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>{n} sent, {same} the same in Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
             <source>It has no Silo part number yet, so it was not sent.</source>
             <translation>Noch keine Silo-Teilenummer, daher nicht gesendet.</translation>
         </message>
@@ -492,6 +549,11 @@
             <location filename="../../commit/flow.py" />
             <source>Saved, but not in Silo: {name}</source>
             <translation>Gespeichert, aber nicht in Silo: {name}</translation>
+        </message>
+        <message>
+            <location filename="../../commit/plan.py" />
+            <source>another program changed the file since it was opened: reload it, or commit yours over it</source>
+            <translation type="unfinished" />
         </message>
         <message>
             <location filename="../../commit/plan.py" />
@@ -592,12 +654,6 @@
             <location filename="../../freecad/loss_guard.py" />
             <source>Made by a newer FreeCAD: {name}</source>
             <translation>Von einem neueren FreeCAD: {name}</translation>
-        </message>
-        <message>
-            <location filename="../../freecad/silo_group.py" />
-            <location filename="../../revisions/project.py" />
-            <source>in Silo</source>
-            <translation>in Silo</translation>
         </message>
         <message>
             <location filename="../../freecad/silo_group.py" />
@@ -1967,47 +2023,6 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
             <location filename="../../revisions/ghosts.py" />
             <source>Not compared: {unknown} in groups and arrays without links.</source>
             <translation>Nicht verglichen: {unknown} in Gruppen und Anordnungen ohne Verknüpfungen.</translation>
-        </message>
-        <message>
-            <location filename="../../revisions/project.py" />
-            <source>not in Silo</source>
-            <translation>nicht in Silo</translation>
-        </message>
-        <message>
-            <location filename="../../revisions/project.py" />
-            <source>edited since its commit</source>
-            <translation>seit dem Einchecken geändert</translation>
-        </message>
-        <message>
-            <location filename="../../revisions/project.py" />
-            <source>newer in Silo</source>
-            <translation>neuer in Silo</translation>
-        </message>
-        <message>
-            <location filename="../../revisions/project.py" />
-            <source>edited, and newer in Silo</source>
-            <translation>geändert, und neuer in Silo</translation>
-        </message>
-        <message>
-            <location filename="../../revisions/project.py" />
-            <source>waits to be sent</source>
-            <translation>wartet auf das Senden</translation>
-        </message>
-        <message>
-            <location filename="../../revisions/project.py" />
-            <location filename="../../../outbox/status_text.py" />
-            <source>held for your choice</source>
-            <translation>wartet auf Ihre Entscheidung</translation>
-        </message>
-        <message>
-            <location filename="../../revisions/project.py" />
-            <source>the server was restored from a backup: it has an older one</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../revisions/project.py" />
-            <source>its item is not on this server</source>
-            <translation>sein Artikel ist nicht auf diesem Server</translation>
         </message>
         <message>
             <location filename="../../revisions/project.py" />
