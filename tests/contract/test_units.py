@@ -113,3 +113,21 @@ def test_a_manual_line_without_a_unit_conflicts_in_metres_not_in_pieces(api: Api
     assert [conflict["child_part_number"] for conflict in api.get(bom(product, "review"))["conflicts"]] == [
         hose
     ]
+
+
+def test_half_a_metre_is_ordered_at_the_price_of_a_metre(api: Api) -> None:
+    """Without a pack; what was ordered in millimetres counts, and what was ordered in boxes is named."""
+    product, hose = hose_of(api)
+    offer = {"supplier": "Acme", "prices": [{"quantity": "1", "price": "10"}], "currency": "EUR"}
+    api.good("PUT", f"/api/items/{hose}/suppliers", {"supplier_parts": [offer]})
+    api.add_line(product, hose, quantity=500, unit="mm")
+    (part,) = api.get(f"/api/items/{product}/order")["parts"]
+    assert (part["quantity"], part["unit"], part["cost"]) == ("0.5", "m", "5")
+    ordered = [
+        {"part_number": hose, "quantity": "200", "unit": "mm"},
+        {"part_number": hose, "quantity": "1", "unit": "box"},
+    ]
+    api.good("POST", f"/api/items/{product}/orders", {"parts": ordered})
+    (part,) = api.get(f"/api/items/{product}/order?rest=true")["parts"]
+    assert (part["ordered"], part["needed"], part["cost"]) == ("0.2", "0.3", "3")
+    assert "ordered in another unit: 1 box" in part["remarks"]

@@ -19,7 +19,7 @@ from sqlalchemy import insert, or_, select, update
 
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError, counted, listed
 from silo.bom.quantities import exact_product, exact_sum, plain
-from silo.bom.units import counts_pieces
+from silo.bom.units import converted, unit_of
 from silo_server.db.rows import one_of
 from silo_server.db.tables import document_items, documents, items, orders, revisions
 from silo_server.db.transaction import Tx
@@ -200,14 +200,13 @@ def order_list(tx: Tx, part_number: str, asked: OrderRequest) -> OrderList:
         parts = parts_of(tx, graph)
         ids = {item_id: item_id for item_id in parts}
     closed = {item_id for item_id, part in parts.items() if part.is_bought} - {graph.root.id}
-    # A part that is used by the piece and by the metre is two rows.
-    done, rates, none = _ordered(tx, product), rates_of(tx), Decimal(0)
+    done, rates, none = _ordered(tx, product), rates_of(tx), dict[str | None, Decimal]()
     rows = [
         _row(
             row,
             parts[row.line.child_id],
             asked,
-            done.get((ids.get(row.line.child_id), row.unit), none),
+            done.get(ids.get(row.line.child_id), none),
             rates,
         )
         for row in flatten(graph, closed)
@@ -220,17 +219,31 @@ def order_list(tx: Tx, part_number: str, asked: OrderRequest) -> OrderList:
 
 
 def _row(
-    flat_row: FlatRow, part: RolledItem, asked: OrderRequest, done: Decimal, rates: Mapping[str, Decimal]
+    flat_row: FlatRow,
+    part: RolledItem,
+    asked: OrderRequest,
+    ordered: Mapping[str | None, Decimal],
+    rates: Mapping[str, Decimal],
 ) -> OrderRow:
+    own = unit_of(flat_row.unit)
+    amounts = [converted(amount, unit_of(unit, flat_row.unit), own) for unit, amount in ordered.items()]
+    done = exact_sum(amount for amount in amounts if amount is not None)
     kind = BOUGHT if part.is_bought else MADE if part.sourcing_type == "manufactured" else UNSAID
     total = exact_product((flat_row.total, asked.pieces))
     needed = exact_product((total, 1 + asked.spares / 100)) if asked.spares else total
     if asked.rest:
         needed = max(Decimal(0), exact_sum((needed, -done)))
-    if counts_pieces(flat_row.unit):
+    if own.counts_pieces:
         needed = needed.to_integral_value(ROUND_CEILING)
-    offer = choose(supplier_parts_of(part), needed, rates) if kind == BOUGHT else None
+    offer = (
+        choose(supplier_parts_of(part), needed, rates, whole=own.counts_pieces) if kind == BOUGHT else None
+    )
     doubts = flat_row.doubts(asked.pieces)
+    doubts += [
+        f"ordered in another unit: {decimal_text(amount)} {unit}"
+        for (unit, amount), same in zip(ordered.items(), amounts, strict=True)
+        if same is None
+    ]
     return OrderRow(flat_row.line.child_id, part, flat_row.unit, total, needed, done, doubts, kind, offer)
 
 
@@ -409,14 +422,16 @@ def list_recorded(
     return [(from_row(Recorded, row), row.part_number) for row in rows]
 
 
-def _ordered(tx: Tx, product: Item) -> dict[tuple[int | None, str | None], Decimal]:
+def _ordered(tx: Tx, product: Item) -> dict[int | None, dict[str | None, Decimal]]:
+    """Add up what was ordered for a product: item → unit → quantity."""
     row = orders.c
     query = select(row.item_id, row.unit, row.quantity).where(
         row.product_id == product.id, row.ended_at.is_(None)
     )
-    amounts: dict[tuple[int | None, str | None], Decimal] = {}
+    amounts: dict[int | None, dict[str | None, Decimal]] = {}
     for item_id, unit, quantity in tx.conn.execute(query):
-        amounts[item_id, unit] = exact_sum((amounts.get((item_id, unit), Decimal(0)), Decimal(quantity)))
+        of_item = amounts.setdefault(item_id, {})
+        of_item[unit] = exact_sum((of_item.get(unit, Decimal(0)), Decimal(quantity)))
     return amounts
 
 

@@ -87,20 +87,26 @@ class SupplierPart(NamedTuple):
         """Return what no two supplier parts of an item may share."""
         return self.supplier.casefold(), self.number.casefold()
 
-    def amount(self, needed: Decimal) -> Decimal:
-        """Find the amount to order if ``needed`` is needed: at least the minimum, in whole packs; 0 for 0."""
+    def amount(self, needed: Decimal, *, whole: bool = True) -> Decimal:
+        """Find the amount to order if ``needed`` is needed: at least the minimum, in whole packs; 0 for 0.
+
+        Not ``whole``: a pack of 1 is no pack, for what is measured and not counted: half a metre is sold.
+        """
         if not needed:
             return Decimal(0)
         wanted = max(needed, self.minimum)
         if self.pack_size == 1:
-            return wanted.to_integral_value(ROUND_CEILING)
+            return wanted.to_integral_value(ROUND_CEILING) if whole else wanted
         packs = ceil(Fraction(wanted) / Fraction(self.pack_size))
         return exact_product((packs, self.pack_size))
 
     def price_at(self, amount: Decimal) -> Decimal | None:
-        """Find the price of one piece if ``amount`` is ordered; None below the first price."""
+        """Find the price of one if ``amount`` is ordered; None below the first price.
+
+        A price from 1 on is that of less than 1 too: half a metre at 10 EUR/m.
+        """
         for least, price in reversed(self.prices):
-            if least <= amount:
+            if least <= max(amount, Decimal(1)):
                 return price
         return None
 
@@ -121,14 +127,16 @@ class SupplierOffer(NamedTuple):
 
 
 def choose(
-    parts: Sequence[SupplierPart], needed: Decimal, rates: Mapping[str, Decimal]
+    parts: Sequence[SupplierPart], needed: Decimal, rates: Mapping[str, Decimal], *, whole: bool = True
 ) -> SupplierOffer | None:
     """Choose the preferred supplier part, else the cheapest for what is needed; None if there is none.
 
     rates
         what one of a currency is in the site's own. What cannot be compared comes behind what can.
+    whole
+        as in :meth:`SupplierPart.amount`.
     """
-    offers = [_offer(part, needed, rates) for part in parts]
+    offers = [_offer(part, needed, rates, whole) for part in parts]
     if len(offers) < 2:
         return offers[0] if offers else None
     offers = [offer for offer in offers if offer.of.preferred] or offers
@@ -138,16 +146,16 @@ def choose(
     return next((offer for offer in offers if offer.cost is not None), offers[0])
 
 
-def _offer(part: SupplierPart, needed: Decimal, rates: Mapping[str, Decimal]) -> SupplierOffer:
+def _offer(part: SupplierPart, needed: Decimal, rates: Mapping[str, Decimal], whole: bool) -> SupplierOffer:
     def cost_of(amount: Decimal) -> Decimal | None:
         price = part.price_at(amount)
         return None if price is None else exact_product((amount, price))
 
-    amount = part.amount(needed)
+    amount = part.amount(needed, whole=whole)
     price, rate = part.price_at(amount), rates.get(part.currency)
     cost = cost_of(amount)
     in_base = None if cost is None or rate is None else exact_product((cost, rate))
-    larger = {part.amount(least) for least, _ in part.prices if least > amount}
+    larger = {part.amount(least, whole=whole) for least, _ in part.prices if least > amount}
     cheaper = [
         (more, other) for other in larger if (more := cost_of(other)) is not None and more < (cost or 0)
     ]
