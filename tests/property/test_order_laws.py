@@ -53,8 +53,8 @@ def by_counting(part: SupplierPart, needed: Decimal) -> Decimal:
 
 
 def by_looking(part: SupplierPart, amount: Decimal) -> Decimal | None:
-    """Of all prices from a quantity that is reached, that of the largest."""
-    reached = {least: price for least, price in part.prices if least <= amount}
+    """Of all prices from a quantity that is reached, that of the largest; less than 1 costs as 1 does."""
+    reached = {least: price for least, price in part.prices if least <= max(amount, Decimal(1))}
     return reached[max(reached)] if reached else None
 
 
