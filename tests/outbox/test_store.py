@@ -777,6 +777,9 @@ def test_what_a_file_was_made_from(store: Store, document: Path) -> None:
     write_record(str(document), FileRecord("ID", "pulled", since=entry.taken_at + 1))
     assert store.origins("other", str(document), "ID") == ("pulled", "other")
     assert store.origins("pulled", str(document), "ID") == ("pulled",)
+    store.derived("stale", "read before")
+    store.replaced("stale")
+    assert store.origins("stale", str(document), "ID") == ("read before", "stale")  # its record says nothing
     write_record(str(document), None)
     store.discard(entry.id)
     assert store.origins("other", str(document), "ID") == ("other",)

@@ -59,6 +59,8 @@ _REMEMBERED = 2 * 366 * 86400.0
 # Saves between two commits that are followed back.
 _LONGEST_LINEAGE = 1000
 _LOOK_FOR_IT = FileRecord("")
+# Stands before the first content of a document that was saved over a file that another program had written.
+_OTHER_FILE = "another file"
 # A copy of a file that was replaced is kept for so long, or until the user deletes it.
 KEPT_ASIDE_DAYS = 90
 _NEWEST_DAYS = 3
@@ -336,6 +338,15 @@ class FileOrigins(QueueDatabase):
         with self.transaction() as db:
             db.execute("INSERT OR REPLACE INTO derived VALUES (?, ?, ?)", (sha256, origin, self.clock()))
             db.execute("DELETE FROM derived WHERE at < ?", (self.clock() - _REMEMBERED,))
+
+    def replaced(self, content: str) -> None:
+        """Note that a document of this content was saved over a file that another program had written since:
+        the record of that file says nothing of the document.
+        """
+        if content and content != UNKNOWN:
+            first = (self.lineage(content) or [content])[-1]
+            if first != _OTHER_FILE:
+                self.derived(first, _OTHER_FILE)
 
     def known_revision(self, server: str, sha256: str, item: str) -> int | None:
         """Return the revision that a file is, for servers that keep no checksums; None if it is not known."""
@@ -696,9 +707,11 @@ class Store(FileOrigins):
         """
         if record is _LOOK_FOR_IT:
             record = record_of(path) if path else None
+        line = self.lineage(sha256)
+        if line[-1:] == [_OTHER_FILE]:  # it was saved over a file that it does not come from
+            return tuple(dict.fromkeys([*line[:-1], sha256]))
         if record is not None and record.sha256 == sha256:
             return (sha256,)
-        line = self.lineage(sha256)
         with self._open() as db:
             known = {
                 content

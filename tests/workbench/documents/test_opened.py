@@ -24,6 +24,9 @@ class Store:
     def derived(self, sha256: str, origin: str, /) -> None:
         self.known[sha256] = origin
 
+    def replaced(self, content: str, /) -> None:
+        self.known[content] = "another file"
+
     def first(self, sha256: str) -> str:
         """What it was made from in the first place."""
         return self.first(self.known[sha256]) if sha256 in self.known else sha256

@@ -33,6 +33,8 @@ class Origins(Protocol):
 
     def derived(self, sha256: str, origin: str, /) -> None: ...
 
+    def replaced(self, content: str, /) -> None: ...
+
 
 class DocumentOrigin:
     """What one document was made from.
@@ -62,9 +64,15 @@ class DocumentOrigin:
                 self.content = _unchanged_hash(self.path, self.stamp) or UNKNOWN
             return self.content
 
-    def saved(self, origins: Origins, stamp: Stamp | None) -> None:
-        """Note the content of a save, and the one before it. From any thread."""
+    def saved(self, origins: Origins, stamp: Stamp | None, *, is_over: bool) -> None:
+        """Note the content of a save, and the one before it. From any thread.
+
+        is_over
+            another program had written the file that was saved over.
+        """
         with self._lock:
+            if is_over:
+                origins.replaced(self.content)
             if content := _unchanged_hash(self.path, stamp):
                 origins.derived(content, self.content)
                 self.content = content
@@ -106,6 +114,7 @@ class Opened:
     def __init__(self, outbox: Callable[[], Origins]) -> None:
         self._outbox = outbox
         self._bases: dict[str, DocumentOrigin] = {}
+        self._saved_over: set[str] = set()
         self._work: Callable[[Callable[[], object]], object] | None = None
         self._left: list[Callable[[], object]] = []
 
@@ -166,6 +175,8 @@ class Opened:
         base = self._bases.get(doc.Name)
         if base is not None and base.path == filename and not base.content:
             self._settle(base)
+        if base is not None and base.path == filename and base.replaced:
+            self._saved_over.add(doc.Name)
 
     def slotFinishSaveDocument(self, doc: Any, filename: str) -> None:
         """Note that this FreeCAD wrote the file."""
@@ -174,4 +185,6 @@ class Opened:
             return
         base.path, base.stamp = doc.FileName, _stamp(doc.FileName)
         stamp = base.stamp
-        self._later(lambda: base.saved(self._outbox(), stamp))
+        is_over = doc.Name in self._saved_over
+        self._saved_over.discard(doc.Name)
+        self._later(lambda: base.saved(self._outbox(), stamp, is_over=is_over))
