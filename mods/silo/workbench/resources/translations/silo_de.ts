@@ -286,7 +286,7 @@
         <message>
             <location filename="../../colleagues/states.py" />
             <source>the server was restored from a backup: it has an older one</source>
-            <translation type="unfinished" />
+            <translation>der Server wurde aus einer Sicherung wiederhergestellt: er hat eine ältere</translation>
         </message>
         <message>
             <location filename="../../colleagues/states.py" />
@@ -533,12 +533,12 @@
         <message>
             <location filename="../../commit/flow.py" />
             <source>Not all files below it are in Silo: {name}</source>
-            <translation type="unfinished" />
+            <translation>Nicht alle Dateien darunter sind in Silo: {name}</translation>
         </message>
         <message>
             <location filename="../../commit/flow.py" />
             <source>{n} sent, {same} the same in Silo</source>
-            <translation type="unfinished" />
+            <translation>{n} gesendet, {same} gleich in Silo</translation>
         </message>
         <message>
             <location filename="../../commit/flow.py" />
@@ -553,7 +553,7 @@
         <message>
             <location filename="../../commit/plan.py" />
             <source>another program changed the file since it was opened: reload it, or commit yours over it</source>
-            <translation type="unfinished" />
+            <translation>ein anderes Programm hat die Datei seit dem Öffnen geändert: laden Sie sie neu, oder checken Sie Ihre darüber ein</translation>
         </message>
         <message>
             <location filename="../../commit/plan.py" />
@@ -2077,12 +2077,12 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         <message>
             <location filename="../../revisions/pulled.py" />
             <source>{name} waits to be sent; it was left alone.</source>
-            <translation type="unfinished" />
+            <translation>{name} wartet auf das Senden; die Datei blieb, wie sie ist.</translation>
         </message>
         <message>
             <location filename="../../revisions/pulled.py" />
             <source>{name} is newer than the server, which was restored from a backup; it was left alone.</source>
-            <translation type="unfinished" />
+            <translation>{name} ist neuer als der Server, der aus einer Sicherung wiederhergestellt wurde; die Datei blieb, wie sie ist.</translation>
         </message>
         <message>
             <location filename="../../revisions/pulled.py" />
