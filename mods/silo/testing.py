@@ -8,7 +8,7 @@ What :class:`silo.testing.FakeSilo` holds, and how it changes: items, revisions,
 It follows the same rules (the merge is :func:`silo.bom.compare.merge.plan_merge`, which the server uses
 too), and one contract suite runs over it and over the embedded server. ``before`` and ``after`` are called
 with the method's name around each change: raise there what the network or a crash would do, before or after
-it acted.
+it acted. The file of a commit counts as a model, whatever its bytes are: a test need not make one.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from silo.api.multipart import Progress
 from silo.api.sse import MERGE, STATE, ServerEvent
 from silo.api.transport import Cancel, stop_if
 from silo.api.wire import (
+    Attachment,
     BomLine,
     Document,
     HeldItem,
@@ -58,13 +59,13 @@ from silo.bom.errors import (
     NotFoundError,
     ReadOnlyError,
     RejectedError,
-    RouteMissingError,
     VersionConflictError,
 )
 from silo.bom.left_out import Reason, remembered
 from silo.bom.text import name_key
 from silo.bom.units import counts_pieces
 from silo.bom.walk.identity import as_uuid
+from silo.file_kind import ATTACHMENT_KINDS, MODEL, kind_of
 
 __all__ = ["FakeSilo"]
 
@@ -87,6 +88,8 @@ class Stored:
     files: dict[int, bytes] = field(default_factory=dict)
     held: list[HeldItem] = field(default_factory=list)  # what is in its newest file
     became: str = ""  # the document that its file is now
+    attached: list[str] = field(default_factory=list)  # the documents of its attachments
+    kind: str = MODEL  # of a document
     lines: list[dict[str, Any]] = field(default_factory=list)
 
     @property
@@ -208,7 +211,8 @@ class FakeStore:
         return {stored.item.id: stored for stored in (*self.items.values(), *self.documents.values())}
 
     def _checksums(self) -> set[str]:
-        revisions = (revision for stored in self._files().values() for revision in stored.revisions)
+        stored_models = (stored for stored in self._files().values() if stored.kind == MODEL)
+        revisions = (revision for stored in stored_models for revision in stored.revisions)
         return {revision.file_checksum for revision in revisions if revision.file_checksum}
 
     def _next_number(self, category: str) -> str:
@@ -271,6 +275,7 @@ class FakeStore:
             base_revision=origin.base_revision if origin else None,
             file_path=(origin.file_path or None) if origin else None,
             links=(origin.links or []) if origin else [],
+            kind=None if content is None else stored.kind,
         )
         stored.revisions.append(revision)
         if content is not None:
@@ -770,10 +775,43 @@ class FakeSilo(FakeStore):
             self._keep(f"upload {stored.item.id}", idempotency_key, request, revision)
             return revision
 
+    def attachments(self, part_number: str, /) -> list[Attachment]:
+        shown = []
+        for uuid in self._stored(part_number).attached:
+            document = self.documents[uuid]
+            newest = document.revisions[-1]
+            values = newest.model_dump(
+                exclude_none=True, exclude={"properties", "links", "draft", "document"}
+            )
+            about = {"id": uuid, "part_number": part_number, "kind": document.kind}
+            shown.append(Attachment.model_validate(values | about))
+        return shown
+
     def attach_file(
-        self, part_number: str, path: Path | str, file_name: str, *, cancelled: Cancel | None = None
+        self,
+        part_number: str,
+        path: Path | str,
+        file_name: str,
+        *,
+        kind: str = "",
+        cancelled: Cancel | None = None,
     ) -> None:
-        raise RouteMissingError(f"{self.base_url} keeps each file as a document; it has no attachments")
+        stop_if(cancelled)
+        content, kind = Path(path).read_bytes(), kind or kind_of(path, file_name)
+        if kind not in ATTACHMENT_KINDS:
+            raise RejectedError(f"kind: {file_name} is a {kind}, and no attachment")
+        with self._changing("attach_file"):
+            stored = self._stored(part_number)
+            for uuid in stored.attached:
+                document = self.documents[uuid]
+                if (document.kind, document.revisions[-1].file_name) == (kind, file_name):
+                    break
+            else:
+                uuid = str(uuid4())
+                document = Stored(Item(id=uuid, part_number=f"document {uuid}"), kind=kind)
+                self.documents[uuid] = document
+                stored.attached.append(uuid)
+            self._revise(document, "", None, content, file_name)
 
     def download_file(
         self,

@@ -174,8 +174,10 @@ def restore(
         with scratch_folder("restore-", settings.storage) as folder:
             copy = Path(folder) / "silo.db"
             shutil.copyfile(source / "silo.db", copy)
-            with _open(Settings(database_url=f"sqlite:///{copy}")) as old, _open(settings) as db:
-                upgrade(old)
+            beside = Settings(database_url=f"sqlite:///{copy}", files_dir=source / "files")
+            with _open(beside) as old, _open(settings) as db:
+                for sentence in upgrade(old):
+                    report(sentence)
                 upgrade(db)
                 with db.read() as tx:
                     present = tx.conn.scalar(select(func.count()).select_from(items)) or 0

@@ -89,7 +89,7 @@ def prepare(db: Database, token: str | None = None, *, reset_admin: str | None =
         the user with this name becomes an active admin, is made if there is none, and is let in: the way
         back for people who locked themselves out.
     """
-    upgrade(db)
+    left = upgrade(db)
     with db.write(even_when_read_only=True) as tx:
         tx.lock(MIGRATION_LOCK)  # of two servers that start at once, one makes the first admin
         if tx.conn.scalar(select(func.count()).select_from(users)) == 0:
@@ -111,7 +111,7 @@ def prepare(db: Database, token: str | None = None, *, reset_admin: str | None =
         late = stamp(tx.at + timedelta(minutes=1))
     behind = f"The clock is behind: the last change is of {last}, and now it is {stamp(db.clock())}. Set it."
     tidy(db, FileStore(db.settings.storage))
-    warnings = [behind] if last > late else []
+    warnings = [*left, *([behind] if last > late else [])]
     if dead:
         warnings.append(f"SILO_API_TOKEN lets nobody in: {dead}. Put a new one there.")
     return Welcome(admin.username if admin else None, secret, link, warnings)
@@ -131,6 +131,7 @@ READING_THREADS = 40
 def routers() -> tuple[APIRouter, ...]:
     """Import and return all routers; late, as this takes half of the import, and a backup needs none."""
     from silo_server.routes import (
+        attachments,
         items,
         orders,
         parts_table,
@@ -155,6 +156,7 @@ def routers() -> tuple[APIRouter, ...]:
         items.router,
         items.revisions_router,
         items.by_uuid,
+        attachments.router,
         releases.router,
         scene.router,
         lines.router,

@@ -15,6 +15,7 @@ from silo.bom.errors import (
     ConfigError,
 )
 from silo.bom.numbers import yes_or_no
+from silo.file_kind import ATTACHMENT_KINDS
 from silo.platform import data_folder
 
 MIB = 1024 * 1024
@@ -60,6 +61,8 @@ class Settings:
         what was wrong with the settings at the start, for the page of the system; not from the environment.
     release_labels
         names of the revisions of products: ``letters`` (A, B, … without I and O) or ``numbers`` (1.0, 2.0).
+    release_wants
+        kinds of attachments that each part of one's own needs for a release, with commas: ``drawing, step``.
     release_approvals, release_override
         how many people approve a revision, and whether they may release what is blocked, with a reason.
     history_days, audit_days
@@ -99,6 +102,7 @@ class Settings:
     release_labels: str = "letters"
     release_approvals: int = 1
     release_override: bool = True
+    release_wants: str = ""
     admin_username: str = "admin"
     admin_password: str | None = None
 
@@ -114,6 +118,15 @@ class Settings:
             raise ConfigError(f"release labels: wanted letters or numbers, got {self.release_labels!r}")
         if self.release_approvals < 1:
             raise ConfigError(f"release approvals: wanted 1 or more, got {self.release_approvals}")
+        if unknown := [kind for kind in self.release_kinds if kind not in ATTACHMENT_KINDS]:
+            raise ConfigError(
+                f"release wants: wanted kinds ({', '.join(ATTACHMENT_KINDS)}), got {', '.join(unknown)}"
+            )
+
+    @property
+    def release_kinds(self) -> tuple[str, ...]:
+        """Return the kinds of ``release_wants``."""
+        return tuple(filter(None, (kind.strip().lower() for kind in self.release_wants.split(","))))
 
     @property
     def sqlalchemy_url(self) -> str:
@@ -168,7 +181,7 @@ _NAMES = (
         "public_url",
     ),
     *("admin_username", "admin_password", "freecad_version", "release_labels", "release_approvals"),
-    *("release_override", "trusted_proxies"),
+    *("release_override", "release_wants", "trusted_proxies"),
 )
 _ENVIRONMENT = {name: f"SILO_{name.upper()}" for name in _NAMES} | {"files_dir": "SILO_STORAGE_ROOT_DIR"}
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from silo.bom.units import line_unit
+from silo.file_kind import MODEL
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +67,11 @@ def bought(sourcing: str | None, supplier: object) -> bool:
 @dataclass(frozen=True, slots=True)
 class Document:
     """A file with revisions of its own, or with those of the item ``item_id``. ``uuid`` is what the world
-    knows."""
+    knows.
+
+    kind
+        ``model``, or that of an attachment (:mod:`silo.file_kind`), which lies at the item ``attached_to``.
+    """
 
     id: int
     uuid: str
@@ -75,6 +80,9 @@ class Document:
     created_at: str
     created_by: str
     became: str | None = None
+    kind: str = MODEL
+    attached_to: int | None = None
+    removed_at: str | None = None
 
     @property
     def subject(self) -> str:
@@ -88,6 +96,8 @@ class Revision:
 
     base_revision, file_path, links
         what the client said of the file (:class:`silo.api.wire.Revision`).
+    kind
+        of its file; None without one.
     """
 
     revision_number: int
@@ -103,6 +113,12 @@ class Revision:
     base_revision: int | None = None
     file_path: str | None = None
     links: Sequence[Mapping[str, str]] = ()
+    kind: str | None = None
+
+    @property
+    def is_model(self) -> bool:
+        """Return True if the file is a model; an item's older revision may hold an attachment."""
+        return self.kind == MODEL
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from pathlib import Path
 from uuid import uuid4
 
 import pytest
+from model_file import model_file
 
 from silo.api.client import SiloClient
 from silo.api.files import DocumentId, Origin
@@ -336,7 +337,7 @@ def test_a_line_is_edited_and_removed_by_hand(silo: Silo) -> None:
 
 def test_a_file_becomes_a_revision_and_comes_back(silo: Silo, tmp_path: Path) -> None:
     """Upload, list, download: the bytes and their hash are the same."""
-    number, content = make(silo, "Housing"), bytes(range(256)) * 700
+    number, content = make(silo, "Housing"), model_file(bytes(range(256)) * 700)
     source, back = tmp_path / 'Ho"use ä.FCStd', tmp_path / "back.FCStd"
     source.write_bytes(content)
     seen: list[tuple[int, int]] = []
@@ -391,7 +392,7 @@ def test_a_merge_is_announced(silo: Silo) -> None:
 
 
 def sha(content: str) -> str:
-    return hashlib.sha256(content.encode()).hexdigest()
+    return hashlib.sha256(model_file(content.encode())).hexdigest()
 
 
 def with_files(silo: Silo, folder: Path) -> str:
@@ -399,7 +400,7 @@ def with_files(silo: Silo, folder: Path) -> str:
     number = make(silo, "Top", "A01")
     for content in ("one", "two", "one", "", "three"):
         if content:
-            (folder / "Top.FCStd").write_text(content)
+            (folder / "Top.FCStd").write_bytes(model_file(content.encode()))
             silo.upload_file(number, folder / "Top.FCStd", content)
         else:
             silo.update_item(number, properties={"mass_kg": 2})
@@ -410,7 +411,7 @@ def test_a_file_that_would_undo_the_newest_is_refused(silo: Silo, tmp_path: Path
     """By the revision that it was made from; the newest file itself undoes nothing."""
     number, file = with_files(silo, tmp_path), tmp_path / "Top.FCStd"
     for base, content in ((4, "mine"), (3, "one"), (0, "two")):
-        file.write_text(content)
+        file.write_bytes(model_file(content.encode()))
         with pytest.raises(NewerRevisionError) as caught:
             silo.upload_file(number, file, origin=Origin(base_revision=base))
         newer = caught.value.revision
@@ -420,7 +421,7 @@ def test_a_file_that_would_undo_the_newest_is_refused(silo: Silo, tmp_path: Path
     for made, (base, content) in enumerate(
         ((0, "three"), (6, "mine"), (8, "more"), (None, "other")), start=6
     ):
-        file.write_text(content)
+        file.write_bytes(model_file(content.encode()))
         assert silo.upload_file(number, file, origin=Origin(base_revision=base)).revision_number == made
 
 
@@ -473,7 +474,7 @@ def test_a_file_of_several_items_has_revisions_of_its_own(silo: Silo, tmp_path: 
     held = [HeldItem(item=item.id, object=f"Part{n}") for n, item in enumerate(items)]
     held.append(HeldItem(item=str(uuid4()), object="NotInSilo"))
     origin = Origin(base_revision=0, file_path="parts/both.FCStd", items=held)
-    for number, content in enumerate((b"one", b"two"), start=1):
+    for number, content in enumerate((model_file(b"one"), model_file(b"two")), start=1):
         (tmp_path / "both.FCStd").write_bytes(content)
         base = origin.model_copy(update={"base_revision": number - 1})
         made = silo.upload_file(
@@ -483,19 +484,19 @@ def test_a_file_of_several_items_has_revisions_of_its_own(silo: Silo, tmp_path: 
             uuid, tmp_path / "both.FCStd", "c", idempotency_key=f"{uuid}{number}", origin=base
         )
         assert (made.revision_number, again.revision_number) == (number, number)
-    (tmp_path / "both.FCStd").write_bytes(b"three")
+    (tmp_path / "both.FCStd").write_bytes(model_file(b"three"))
     old = origin.model_copy(update={"base_revision": 1})
     with pytest.raises(NewerRevisionError) as refused:
         silo.upload_file(uuid, tmp_path / "both.FCStd", origin=old)
     assert refused.value.revision["revision_number"] == 2
     assert [one.revision_number for one in silo.revisions(uuid)] == [2, 1]
     silo.download_file(uuid, tmp_path / "back", 1)
-    assert (tmp_path / "back").read_bytes() == b"one"
+    assert (tmp_path / "back").read_bytes() == model_file(b"one")
     for item in items:
         (document,) = silo.documents_of(item.part_number)
         assert (document.id, document.part_number, document.revision_number) == (uuid, "", 2)
         assert (document.file_name, document.file_path) == ("both.FCStd", "parts/both.FCStd")
-        assert document.file_checksum == hashlib.sha256(b"two").hexdigest()
+        assert document.file_checksum == hashlib.sha256(model_file(b"two")).hexdigest()
         assert silo.get_item(item.part_number).current_revision == 0
         assert silo.revisions(item.part_number) == []
     wanted = [(f"Part{n}", item.part_number) for n, item in enumerate(items)]
@@ -509,7 +510,7 @@ def test_the_file_of_one_item_is_one_document_with_the_numbers_of_the_item(
     item = silo.create_item("kindred-rd", "M01", "Alone")
     uuid = DocumentId(item.id)
     assert silo.get_documents([item.id]) == {}
-    for content, to in ((b"a", item.part_number), (b"b", uuid)):
+    for content, to in ((model_file(b"a"), item.part_number), (model_file(b"b"), uuid)):
         (tmp_path / "p.FCStd").write_bytes(content)
         silo.upload_file(to, tmp_path / "p.FCStd")
     assert [one.revision_number for one in silo.revisions(item.part_number)] == [2, 1]
@@ -523,7 +524,7 @@ def test_the_file_of_one_item_is_one_document_with_the_numbers_of_the_item(
 
 def test_a_file_without_an_item_is_used_by_what_links_to_it(silo: Silo, tmp_path: Path) -> None:
     """Until a newer revision links to it no more; a link names the document or the item."""
-    (tmp_path / "f.FCStd").write_bytes(b"f")
+    (tmp_path / "f.FCStd").write_bytes(model_file(b"f"))
     sheet, user = DocumentId(uuid4()), silo.create_item("kindred-rd", "A01", "Top", item_type="assembly")
     part = silo.create_item("kindred-rd", "M01", "Part")
     silo.upload_file(sheet, tmp_path / "f.FCStd")

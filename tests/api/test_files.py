@@ -61,6 +61,7 @@ def test_a_form_holds_comment_properties_and_file(server: Any, client: SiloClien
     assert made.revision_number == 3
     assert {name: content for name, (_, content) in parts.items()} == {
         "comment": "längere\r\nWelle".encode(),
+        "kind": b"model",
         "properties": b'{"mass_kg": 1.5}',
         "file": source.read_bytes(),
     }
@@ -74,8 +75,8 @@ def test_a_name_cannot_break_out_of_its_header(server: Any, client: SiloClient, 
     """Line ends and quotes in a file name stay in it."""
     server.on(UPLOAD, {"revision_number": 1})
     client.upload_file("A01-0001", source, file_name='x"\r\nX-Evil: 1\r\n\r\n.FCStd')
-    assert set(parts_of(server.seen[0])) == {"comment", "file"}
-    assert b"X-Evil" in server.seen[0].body.split(b"\r\n\r\n")[1]
+    assert set(parts_of(server.seen[0])) == {"comment", "file", "kind"}
+    assert b"X-Evil" in server.seen[0].body.rpartition(b"filename=")[2].split(b"\r\n\r\n")[0]
 
 
 def test_an_empty_file_is_a_file(server: Any, client: SiloClient, tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from urllib.parse import quote
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from model_file import model_file
 from openpyxl import load_workbook
 from server_testing import Answer, Api, bom, form_body
 from sqlalchemy import update
@@ -43,7 +44,7 @@ def _line(api: Api, **fields: Any) -> Answer:
 
 
 def _upload(api: Api, **parts: Any) -> Answer:
-    body, headers = form_body({"file": ("a.FCStd", b"x"), **parts})
+    body, headers = form_body({"file": ("a.FCStd", model_file(b"x")), **parts})
     return api.call("POST", f"/api/items/{api.item()}/file", body=body, headers=headers)
 
 

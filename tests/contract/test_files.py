@@ -12,12 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from hunting import BOTH
+from model_file import model_file
 from server_testing import Answer, Api, bom, form_body, merge_body
 
 from silo.api.client import SiloClient
 from silo.api.files import DocumentId, Origin
 
-SHOUTED = hashlib.sha256(b"two").hexdigest().upper()
+SHOUTED = hashlib.sha256(model_file(b"two")).hexdigest().upper()
 PNG = b"\x89PNG\r\n\x1a\n" + b"picture"
 
 
@@ -36,15 +37,15 @@ def upload(api: Api, number: str, content: bytes, name: str = "Part.FCStd", **mo
 def test_an_upload_is_a_new_revision(api: Api) -> None:
     """``file``, ``comment``, ``properties``: the answer has number, SHA-256 and size."""
     number = api.item()
-    content = b"content" * 1000
+    content = model_file(b"content" * 1000)
     answer = upload(api, number, content, comment="first", properties=json.dumps({"mass_kg": 2}))
     assert answer.status == 201
     revision = answer.json()
     assert revision["revision_number"] == 1
     assert revision["file_checksum"] == hashlib.sha256(content).hexdigest()
-    assert (revision["file_size"], revision["file_name"]) == (7000, "Part.FCStd")
+    assert (revision["file_size"], revision["file_name"]) == (len(content), "Part.FCStd")
     assert (revision["comment"], revision["properties"]) == ("first", {"mass_kg": 2})
-    assert upload(api, number, b"second").json()["revision_number"] == 2
+    assert upload(api, number, model_file(b"second")).json()["revision_number"] == 2
     item = api.get(f"/api/items/{number}")
     assert (item["current_revision"], item["properties"]) == (2, {"mass_kg": 2})
     assert [r["revision_number"] for r in api.get(f"/api/items/{number}/revisions")] == [2, 1]
@@ -54,27 +55,27 @@ def test_an_upload_is_a_new_revision(api: Api) -> None:
 def test_a_download_is_the_file_and_never_something_to_run(api: Api) -> None:
     """Served as an attachment of no type, sandboxed, with its hash as ETag."""
     number = api.item()
-    page = b"<script>alert(1)</script>"
+    page = model_file(b"<script>alert(1)</script>")
     upload(api, number, page, name='evil".html')
-    upload(api, number, b"newest")
+    upload(api, number, model_file(b"newest"))
     answer = api.call("GET", f"/api/items/{number}/file/1")
     assert answer.body == page
     assert answer.headers["content-type"] == "application/octet-stream"
     assert answer.headers["content-disposition"].startswith("attachment")
     assert answer.headers["x-content-type-options"] == "nosniff"
     assert "sandbox" in answer.headers["content-security-policy"]
-    assert api.call("GET", f"/api/items/{number}/file").body == b"newest"
+    assert api.call("GET", f"/api/items/{number}/file").body == model_file(b"newest")
     etag = {"If-None-Match": answer.headers["etag"]}
     assert api.call("GET", f"/api/items/{number}/file/1", headers=etag).status == 304
     part = api.call("GET", f"/api/items/{number}/file/1", headers={"Range": "bytes=0-6"})
-    assert (part.status, part.body) == (206, b"<script")
+    assert (part.status, part.body) == (206, page[:7])
 
 
 def test_a_name_from_a_client_is_only_a_name(api: Api) -> None:
     """No path of an upload reaches the disk."""
     number = api.item()
     for name in ("../../etc/passwd", "..\\..\\x.FCStd", "/abs/olute", "..", "\x01"):
-        revision = upload(api, number, b"x", name=name).json()
+        revision = upload(api, number, model_file(b"x"), name=name).json()
         assert "/" not in revision["file_name"]
         assert "\\" not in revision["file_name"]
         assert revision["file_name"] not in ("", ".", "..")
@@ -83,7 +84,7 @@ def test_a_name_from_a_client_is_only_a_name(api: Api) -> None:
 def test_the_same_content_is_kept_once(api: Api, server: Any) -> None:
     """By hash: two items with the same file share it."""
     a, b = api.items(2)
-    content = b"only once " * 50
+    content = model_file(b"only once " * 50)
     checksum = upload(api, a, content).json()["file_checksum"]
     upload(api, b, content)
     assert len(list(server.settings.storage.rglob(checksum))) == 1
@@ -93,11 +94,11 @@ def test_the_same_content_is_kept_once(api: Api, server: Any) -> None:
 def test_a_file_that_arrives_otherwise_is_no_revision(api: Api) -> None:
     """``sha256`` says what was sent."""
     number = api.item()
-    wanted = hashlib.sha256(b"whole").hexdigest()
-    assert upload(api, number, b"who", sha256=wanted).status == 400
-    assert upload(api, number, b"whole", sha256="no hash").status == 400
+    wanted = hashlib.sha256(model_file(b"whole")).hexdigest()
+    assert upload(api, number, model_file(b"who"), sha256=wanted).status == 400
+    assert upload(api, number, model_file(b"whole"), sha256="no hash").status == 400
     assert api.get(f"/api/items/{number}/revisions") == []
-    assert upload(api, number, b"whole", sha256=wanted.upper()).status == 201
+    assert upload(api, number, model_file(b"whole"), sha256=wanted.upper()).status == 201
 
 
 def test_a_thumbnail_is_taken_from_an_fcstd_file(api: Api) -> None:
@@ -113,7 +114,7 @@ def test_a_thumbnail_is_taken_from_an_fcstd_file(api: Api) -> None:
     answer = api.call("GET", f"/api/items/{number}/thumbnail")
     assert (answer.status, answer.body, answer.headers["content-type"]) == (200, PNG, "image/png")
     api.bad(404, "GET", f"/api/items/{other}/thumbnail")
-    upload(api, number, b"a later revision without a picture")
+    upload(api, number, model_file(b"a later revision without a picture"))
     assert api.call("GET", f"/api/items/{number}/thumbnail").body == PNG
 
 
@@ -152,9 +153,9 @@ def test_a_new_file_takes_a_drawn_picture_away(api: Api) -> None:
     whole, a, b, other = api.items(4)
     for number in (whole, a, b, other):
         assert drawn(api, number, png()) == 204
-    upload(api, whole, b"new")
+    upload(api, whole, model_file(b"new"))
     held = [{"item": api.get(f"/api/items/{one}")["id"], "object": one} for one in (a, b)]
-    body, form = form_body({"file": ("x.FCStd", b"two parts"), "items": json.dumps(held)})
+    body, form = form_body({"file": ("x.FCStd", model_file(b"two parts")), "items": json.dumps(held)})
     api.good("POST", f"/api/documents/{uuid.uuid4()}/file", body=body, headers=form)
     kept = [api.get(f"/api/items/{one}")["thumbnail_key"] is not None for one in (whole, a, b, other)]
     assert kept == [False, False, False, True]
@@ -172,7 +173,7 @@ def test_what_is_no_upload_is_refused(api: Api) -> None:
     assert "properties: wanted one part of this name" in error["message"]
     body, headers = form_body({"file": ("a", b"x"), "properties": "[1]"})
     assert "properties" in api.bad(400, "POST", path, body=body, headers=headers)["message"]
-    assert upload(api, "NO-SUCH", b"x").status == 404
+    assert upload(api, "NO-SUCH", model_file(b"x")).status == 404
     assert api.get(f"/api/items/{number}/revisions") == []
     api.bad(404, "GET", f"/api/items/{number}/file")
     api.bad(404, "GET", f"/api/items/{number}/file/1")
@@ -181,10 +182,10 @@ def test_what_is_no_upload_is_refused(api: Api) -> None:
 @BOTH
 def test_a_file_is_found_by_its_content(api: Api) -> None:
     """Searching for a SHA-256 finds the items that have, or had, this very file, whatever their name."""
-    content = uuid.uuid4().bytes
+    content = model_file(uuid.uuid4().bytes)
     older, newer = api.item(name="Motor bracket"), api.item(name="Mount")
     checksum = upload(api, older, content).json()["file_checksum"]
-    upload(api, older, b"a later revision")
+    upload(api, older, model_file(b"a later revision"))
     known = {"properties": {"file_sha256": checksum}}
     assert api.call("PUT", f"/api/items/{newer}", known).status == 200
     for query in (checksum, f"sha256:{checksum}".upper()):
@@ -220,18 +221,18 @@ def test_revisions_come_in_pages(api: Api) -> None:
 def test_a_file_that_was_made_from_an_older_revision_is_refused(api: Api) -> None:
     """409 with the newer one; nothing is added. With the newest as its base it passes, and that is kept."""
     number = api.item()
-    first = upload(api, number, b"one", base_revision="0").json()
+    first = upload(api, number, model_file(b"one"), base_revision="0").json()
     assert (first["revision_number"], first["base_revision"]) == (1, 0)
-    upload(api, number, b"one less", base_revision="1", comment="less")
-    refused = upload(api, number, b"one other", base_revision="1")
+    upload(api, number, model_file(b"one less"), base_revision="1", comment="less")
+    refused = upload(api, number, model_file(b"one other"), base_revision="1")
     assert (refused.status, refused.json()["error"]) == (409, "newer_revision")
     newer = refused.json()["revision"]
     assert (newer["revision_number"], newer["comment"]) == (2, "less")
-    assert newer["file_checksum"] == hashlib.sha256(b"one less").hexdigest()
+    assert newer["file_checksum"] == hashlib.sha256(model_file(b"one less")).hexdigest()
     assert len(api.get(f"/api/items/{number}/revisions")) == 2
-    on_top = upload(api, number, b"one other", base_revision="2")
+    on_top = upload(api, number, model_file(b"one other"), base_revision="2")
     assert (on_top.status, on_top.json()["base_revision"]) == (201, 2)
-    assert upload(api, number, b"who knows").status == 201  # a client that does not say it
+    assert upload(api, number, model_file(b"who knows")).status == 201  # a client that does not say it
 
 
 @BOTH
@@ -239,15 +240,15 @@ def test_what_is_no_other_file_is_no_newer_one(api: Api) -> None:
     """The same content, a repeat with its key, and a revision of properties alone."""
     number = api.item()
     key = {"Idempotency-Key": uuid.uuid4().hex}
-    upload(api, number, b"one")
-    mine = upload(api, number, b"two", base_revision="1", headers=key)
-    assert upload(api, number, b"two", base_revision="1").status == 201
-    upload(api, number, b"three", base_revision="3")
-    again = upload(api, number, b"two", base_revision="1", headers=key)
+    upload(api, number, model_file(b"one"))
+    mine = upload(api, number, model_file(b"two"), base_revision="1", headers=key)
+    assert upload(api, number, model_file(b"two"), base_revision="1").status == 201
+    upload(api, number, model_file(b"three"), base_revision="3")
+    again = upload(api, number, model_file(b"two"), base_revision="1", headers=key)
     assert (again.status, again.json()) == (201, mine.json())
-    assert upload(api, number, b"another", base_revision="1", headers=key).status == 409
+    assert upload(api, number, model_file(b"another"), base_revision="1", headers=key).status == 409
     api.good("POST", f"/api/items/{number}/revisions", {"properties": {"mass_kg": 2}, "comment": "weighed"})
-    assert upload(api, number, b"five", base_revision="4").json()["revision_number"] == 6
+    assert upload(api, number, model_file(b"five"), base_revision="4").json()["revision_number"] == 6
 
 
 @BOTH
@@ -255,32 +256,33 @@ def test_a_bom_that_comes_late_does_not_undo_that_of_a_newer_file(api: Api) -> N
     """``document.revision``: the revision whose BOM it is; by its SHA-256 it may be the newest by another
     number."""
     number, bolt, nut = api.items(3)
-    upload(api, number, b"one")
-    upload(api, number, b"two")
-    api.merge(number, {bolt: 2}, document=document(b"two", revision=2))
-    api.merge(number, {bolt: 2}, document=document(b"two", revision=2, sha256=SHOUTED))
-    late = merge_body({nut: 9}, document=document(b"one", revision=1))
+    upload(api, number, model_file(b"one"))
+    upload(api, number, model_file(b"two"))
+    api.merge(number, {bolt: 2}, document=document(model_file(b"two"), revision=2))
+    api.merge(number, {bolt: 2}, document=document(model_file(b"two"), revision=2, sha256=SHOUTED))
+    late = merge_body({nut: 9}, document=document(model_file(b"one"), revision=1))
     error = api.bad(409, "POST", bom(number, "merge"), late)
     assert (error["error"], error["revision"]["revision_number"]) == ("newer_revision", 2)
     assert api.quantities(number) == {bolt: 2}
-    api.merge(number, {bolt: 3}, document=document(b"two", revision=1))
+    api.merge(number, {bolt: 3}, document=document(model_file(b"two"), revision=1))
     assert api.quantities(number) == {bolt: 3}
 
 
 def test_the_bom_of_an_older_file_is_known_by_its_content(api: Api) -> None:
     """A file that was not fetched again, in a vault that is synced at night, says no revision."""
     number, bolt, nut = api.items(3)
-    for content in (b"two", b"three"):
+    for content in (model_file(b"two"), model_file(b"three")):
         upload(api, number, content)
-    api.merge(number, {bolt: 2}, document=document(b"three"))
-    for dry_run, of in ((True, document(b"two")), (False, document(b"two", sha256=SHOUTED))):
+    api.merge(number, {bolt: 2}, document=document(model_file(b"three")))
+    two = model_file(b"two")
+    for dry_run, of in ((True, document(two)), (False, document(two, sha256=SHOUTED))):
         stale = merge_body({nut: 9}, document=of, dry_run=dry_run)
         error = api.bad(409, "POST", bom(number, "merge"), stale)
         assert (error["error"], error["revision"]["revision_number"]) == ("newer_revision", 2)
     assert api.quantities(number) == {bolt: 2}
-    api.merge(number, {bolt: 3}, document=document(b"edited, and in no revision"))
-    upload(api, number, b"two", comment="back to it")
-    api.merge(number, {bolt: 4}, document=document(b"two"))
+    api.merge(number, {bolt: 3}, document=document(model_file(b"edited, and in no revision")))
+    upload(api, number, model_file(b"two"), comment="back to it")
+    api.merge(number, {bolt: 4}, document=document(model_file(b"two")))
     assert api.quantities(number) == {bolt: 4}
 
 
@@ -288,10 +290,11 @@ def test_a_bom_does_not_go_without_its_file(api: Api) -> None:
     """``document.revision`` and its SHA-256 name a file that is not here: the server was restored since, and
     the number is free, or that of a colleague's file."""
     number, bolt = api.items(2)
-    upload(api, number, b"one")
+    upload(api, number, model_file(b"one"))
     for revision in (1, 2):
         for dry_run in (True, False):
-            gone = merge_body({bolt: 9}, document=document(b"gone", revision=revision), dry_run=dry_run)
+            of = document(model_file(b"gone"), revision=revision)
+            gone = merge_body({bolt: 9}, document=of, dry_run=dry_run)
             assert api.bad(409, "POST", bom(number, "merge"), gone)["error"] == "missing_revision"
     assert api.quantities(number) == {}
 

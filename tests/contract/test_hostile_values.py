@@ -13,6 +13,7 @@ from urllib.parse import quote, urlencode
 
 import pytest
 from hunting import BOTH, over
+from model_file import model_file
 from server_testing import Answer, Api, bom, form_body
 
 DEPTHS = [33, 260, 900, 20_000]
@@ -66,7 +67,7 @@ def send(api: Api, way: str, line: tuple[str, str], text: str) -> Answer:
     method, path, body = (part.replace("PARENT", line[0]).replace("CHILD", line[1]) for part in WAYS[way])
     data, headers = body.replace("VALUE", text).encode(), {"Content-Type": "application/json"}
     if way == "upload":
-        data, headers = form_body({"file": ("x.FCStd", b"x"), "properties": text})
+        data, headers = form_body({"file": ("x.FCStd", model_file(b"x")), "properties": text})
     return api.call(method, path, body=data, headers=headers)
 
 

@@ -14,6 +14,7 @@ import pytest
 from hunting import BOTH, examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from model_file import model_file
 from server_testing import Api, bom
 from web_visitor import enter
 
@@ -115,14 +116,14 @@ def test_an_id_of_an_archived_item_is_a_conflict(api: Api) -> None:
 def test_look_alikes_of_many_components_in_one_request(api: Api) -> None:
     """By name as people read it or by file; each answer at its question's place; archived items are none."""
     word = uuid.uuid4().hex[:8]
-    digest = hashlib.sha256(word.encode()).hexdigest()
+    digest = hashlib.sha256(model_file(word.encode())).hexdigest()
     named, archived, uploaded = (
         api.item(f"{word}-{kind}", name=name)
         for kind, name in (("N", f"Größe {word}"), ("A", f"Größe {word}"), ("U", "third"))
     )
     registered = api.item(f"{word}-R", name="other", properties={"file_sha256": digest.upper()})
     api.good("DELETE", f"/api/items/{archived}")
-    api.upload(uploaded, word.encode(), "Part.FCStd")
+    api.upload(uploaded, model_file(word.encode()), "Part.FCStd")
     wanted = [
         {"name": f"GRÖSSE_{word}.FCStd", "sha256": ""},
         {"name": "nothing like it " + word},

@@ -8,6 +8,7 @@ import threading
 from typing import Any
 
 from hunting import BOTH
+from model_file import model_file
 from server_testing import Api, bom, merge_body
 
 
@@ -133,8 +134,8 @@ def test_unknown_keys_are_ignored_and_every_entry_is_the_assembly_s(api: Api) ->
 def test_the_merge_says_who_and_from_which_file(api: Api) -> None:
     """``document`` goes into the history with user and time."""
     parent, a = api.items(2)
-    api.upload(parent, b"gearbox", "Gearbox.FCStd")
-    sha256 = hashlib.sha256(b"gearbox").hexdigest()
+    api.upload(parent, model_file(b"gearbox"), "Gearbox.FCStd")
+    sha256 = hashlib.sha256(model_file(b"gearbox")).hexdigest()
     document = {"file": "Gearbox.FCStd", "sha256": sha256, "revision": 1}
     api.merge(parent, {a: 1}, document=document, sync_id="with-document")
     change = api.get(bom(parent, "history"))[0]

@@ -220,8 +220,8 @@ def test_a_release_keeps_its_suppliers(api: Api, product: tuple[str, ...]) -> No
 
     for name in ("old.pdf", "plate.step", "new.pdf"):
         api.upload(plate, name.encode(), name)
-    newest = [one["name"] for one in row_of(api, top, plate)["files"]]  # of each kind
-    assert newest == ["new.pdf", "plate.step"]
+    newest = [one["name"] for one in row_of(api, top, plate)["files"]]  # of each name
+    assert newest == ["new.pdf", "old.pdf", "plate.step"]
     api.good("POST", f"/api/items/{top}/releases", {})
     before = api.get(order(top, "?release=A&pieces=7"))
     assert before["warnings"][0] == "Revision A is review, not released"

@@ -8,6 +8,7 @@ from urllib.parse import quote
 
 import pytest
 from hunting import BOTH
+from model_file import model_file
 from server_testing import Api, bom
 
 
@@ -83,7 +84,7 @@ def test_what_is_frozen_stays_as_it_is(api: Api, boss: Api, product: tuple[str, 
     api.merge(sub, {screw: 7, api.item(): 1})
     api.good("PUT", f"/api/items/{screw}", {"name": "another"})
     api.good("PATCH", f"/api/items/{screw}/properties", {"mass_kg": 9})
-    api.upload(sub, b"newer")
+    api.upload(sub, model_file(b"newer"))
     api.good("DELETE", f"/api/items/{screw}")
     assert [api.call("GET", bom(top, one)).body for one in exports] == before
     assert api.get(releases(top, "/A")) == whole
@@ -169,12 +170,12 @@ def test_a_sync_of_a_released_product_says_which_draft_it_begins(
     """And nothing of it before the first release."""
     top, sub, screw = product
     assert "draft" not in api.merge(top, {sub: 2})
-    assert "draft" not in api.upload(top, b"1")
+    assert "draft" not in api.upload(top, model_file(b"1"))
     api.good("POST", releases(top), {"with_parts": True})
     boss.good("POST", releases(top, "/A/approval"), {"override": "one line is gone"})
     assert api.merge(top, {sub: 3, screw: 1})["draft"] == {"label": "B", "released": "A"}
-    assert api.upload(top, b"2")["draft"] == {"label": "B", "released": "A"}
-    assert "draft" not in api.upload(api.item(), b"3")
+    assert api.upload(top, model_file(b"2"))["draft"] == {"label": "B", "released": "A"}
+    assert "draft" not in api.upload(api.item(), model_file(b"3"))
 
 
 def test_labels(api: Api, boss: Api, product: tuple[str, str, str]) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from hunting import BOTH
+from model_file import model_file
 from server_testing import Answer, Api, bom, form_body
 
 Send = Callable[[Api, str, dict[str, Any]], Answer]
@@ -51,7 +52,7 @@ MERGE = {
 }
 UPLOAD = {
     "key": "KEY",
-    "file": ("a.FCStd", b"one"),
+    "file": ("a.FCStd", model_file(b"one")),
     "comment": "first",
     "properties": '{"mass_kg": 1}',
     "path": "parts/a.FCStd",
@@ -77,8 +78,8 @@ ROWS: list[tuple[Send, dict[str, Any], list[dict[str, Any]]]] = [
         upload,
         UPLOAD,
         [
-            {"file": ("a.FCStd", b"two")},
-            {"file": ("b.FCStd", b"one")},
+            {"file": ("a.FCStd", model_file(b"two"))},
+            {"file": ("b.FCStd", model_file(b"one"))},
             {"comment": "second"},
             {"properties": '{"mass_kg": 2}'},
             {"path": "a.FCStd"},
@@ -144,7 +145,7 @@ def test_a_key_belongs_to_its_item_and_its_kind(api: Api) -> None:
     said = {"sync_id": "one", "entries": [{"child_part_number": leaf, "quantity": 1}]}
     for item in (parent, other):
         assert merge(api, item, said).status == 200
-        assert upload(api, item, {"key": "one", "file": ("a", b"x")}).status == 201
+        assert upload(api, item, {"key": "one", "file": ("a", model_file(b"x"))}).status == 201
         assert import_csv(api, item, {"key": "one", "csv": f"Part number,Quantity\n{leaf},1\n"}).status == 200
 
 

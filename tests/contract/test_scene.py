@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from hunting import BOTH
+from model_file import model_file
 from server_testing import Answer, Api, form_body
 
 from silo.drawing import Glb, cube
@@ -77,14 +78,14 @@ def upload(
     api: Api, item: str, content: bytes | None = None, links: list[dict[str, str]] | None = None
 ) -> bytes:
     """Upload a file, of a content that no other test has; returns the content."""
-    content = content or uuid.uuid4().bytes
+    content = content or model_file(uuid.uuid4().bytes)
     api.upload(item, content, links=json.dumps(links or []))
     return content
 
 
 def upload_for(api: Api, document: str, held: dict[str, str]) -> bytes:
     """Upload a file that holds items: object → part number; returns its content."""
-    content = uuid.uuid4().bytes
+    content = model_file(uuid.uuid4().bytes)
     items = [{"item": api.get(f"/api/items/{number}")["id"], "object": name} for name, number in held.items()]
     body, headers = form_body({"file": ("x.FCStd", content), "items": json.dumps(items)})
     api.good("POST", f"/api/documents/{document}/file", body=body, headers=headers)
@@ -387,7 +388,7 @@ def test_items_take_what_their_newest_file_states(api: Api) -> None:
     number = api.item()
     path = f"/api/items/{number}"
     named = api.get(path)["name"]
-    old, new = uuid.uuid4().bytes, uuid.uuid4().bytes
+    old, new = model_file(uuid.uuid4().bytes), model_file(uuid.uuid4().bytes)
     about = {**BOX, "material": "Steel", "description": "Box, 300 long"}
     commit(api, number, content=old, Body={"shape": True, "stated": about})
     item = api.get(path)

@@ -111,6 +111,7 @@ def test_a_workbook_shows_its_parts(api: Api, tree: tuple[str, ...]) -> None:
     for number, picture in (leaf, png(64, 32)), (sub, broken):
         out = io.BytesIO()
         with zipfile.ZipFile(out, "w") as archive:
+            archive.writestr("Document.xml", "<Document/>")
             archive.writestr("thumbnails/Thumbnail.png", picture)
         api.upload(number, out.getvalue())
     plain = load_workbook(io.BytesIO(api.call("GET", bom(top, "export.xlsx?view=indented")).body)).active

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 from hunting import over
+from model_file import model_file
 from server_testing import Api, Databases, bom, form_body, wait_until
 from sqlalchemy import text
 
@@ -56,7 +57,8 @@ BOTH = "0b1e7a52-6c1f-4d0c-9d57-2f1c1b6a9e10"
 def send_document(api: Api, holds: str, content: bytes) -> None:
     """Upload a file that is no item's own."""
     held = [{"item": api.get(f"/api/items/{holds}")["id"], "object": "Part1"}]
-    fields = {"file": ("both.FCStd", content), "path": "parts/both.FCStd", "items": json.dumps(held)}
+    both = ("both.FCStd", model_file(content))
+    fields = {"file": both, "path": "parts/both.FCStd", "items": json.dumps(held)}
     body, headers = form_body(fields)
     answer = api.call("POST", f"/api/documents/{BOTH}/file", body=body, headers=headers)
     assert answer.status == 201, answer.body
@@ -64,7 +66,7 @@ def send_document(api: Api, holds: str, content: bytes) -> None:
 
 def upload(api: Api, item: str, content: bytes) -> None:
     """Upload a file as a new revision."""
-    body, headers = form_body({"file": ("part.FCStd", content), "comment": "c"})
+    body, headers = form_body({"file": ("part.FCStd", model_file(content)), "comment": "c"})
     answer = api.call("POST", f"/api/items/{item}/file", body=body, headers=headers)
     assert answer.status == 201, answer.body
 
@@ -113,7 +115,7 @@ def test_what_was_saved_comes_back_on_the_other_database(
         assert api.get(bom(parent, "history")) == history
         assert api.get("/api/rates") == rates
         assert api.get(f"/api/items/{parent}/releases/A") == frozen
-        assert api.call("GET", f"/api/items/{parent}/file").body == b"first"
+        assert api.call("GET", f"/api/items/{parent}/file").body == model_file(b"first")
         assert api.call("GET", f"/api/documents/{BOTH}/file").body == b"of two parts"
         told = api.get(f"/api/documents/{BOTH}")
         assert (told["file_path"], [one["part_number"] for one in told["holds"]]) == (
@@ -178,7 +180,7 @@ def test_files_that_a_restore_needs_are_not_collected_under_it(tmp_path: Path, d
     (old,) = store.older_than(1)
     backup.restore(settings, tmp_path / "saved", replace=True)
     assert not store.remove_old(old, 1)
-    assert old.read_bytes() == b"first"
+    assert old.read_bytes() == model_file(b"first")
 
 
 def test_a_restore_into_a_running_server_resets_its_listeners(url: str, tmp_path: Path) -> None:
@@ -311,7 +313,7 @@ def test_what_the_server_lost_is_named_and_the_rest_is_saved(
     assert main(["restore", str(tmp_path / "second"), "--replace", *where]) == 0
     # The other backup has the file undamaged, and mends the store.
     assert main(["restore", str(saved), "--replace", *where]) == 0
-    assert file.read_bytes() == b"first"
+    assert file.read_bytes() == model_file(b"first")
 
 
 def test_a_backup_that_fails_leaves_nothing(tmp_path: Path, databases: Databases) -> None:

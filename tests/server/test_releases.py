@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from hunting import over
+from model_file import model_file
 from server_testing import Api, bom, form_body
 from web_visitor import Visitor, visitors_of
 
@@ -29,7 +30,7 @@ VIEWS = [
 
 def put_file(api: Api, item: str, content: bytes) -> None:
     """Upload a file as a new revision of an item."""
-    body, headers = form_body({"file": (f"{item}.FCStd", content)})
+    body, headers = form_body({"file": (f"{item}.FCStd", model_file(content))})
     api.good("POST", f"/api/items/{item}/file", body=body, headers=headers)
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
+from model_file import model_file
 from prometheus_client.parser import text_string_to_metric_families
 from server_testing import Api, form_body, sqlite_database, wait_until
 
@@ -76,7 +77,7 @@ def test_a_body_that_ends_too_soon_is_one_quiet_line(
     number = api.item()
     path = path.format(number)
     caplog.set_level(logging.INFO)
-    body, headers = form_body({"file": ("a.FCStd", b"x" * 5000)})
+    body, headers = form_body({"file": ("a.FCStd", model_file(b"x" * 5000))})
     kind = headers["Content-Type"] if "file" in path or path == "/login" else "application/json"
     parts = urlsplit(server.base_url)
     with socket.create_connection((parts.hostname, parts.port)) as connection:

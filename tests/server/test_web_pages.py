@@ -15,6 +15,7 @@ from pathlib import Path
 from uuid import uuid4
 
 import pytest
+from model_file import model_file
 from server_testing import Api, Databases, bom, form_body, sqlite_database
 from web_visitor import HTML, ROLES, Visitor, enter
 
@@ -75,13 +76,13 @@ def make_busy(api: Api) -> dict[str, str]:
     api.good("PUT", bom(parent, disputed), {"quantity": 6, "notes": HOSTILE, "find_number": HOSTILE[:30]})
     api.merge(parent, {used: 1, disputed: 5}, document={"file": HOSTILE})
     api.good("PUT", f"/api/items/{used}", {"properties": {HOSTILE: HOSTILE}, "comment": HOSTILE})
-    body, headers = form_body({"file": ("<b>x</b>.txt", b"x"), "comment": HOSTILE})
+    body, headers = form_body({"file": ("<b>x</b>.FCStd", model_file(b"x")), "comment": HOSTILE})
     assert api.call("POST", f"/api/items/{used}/file", body=body, headers=headers).status == 201
     sheet = str(uuid4())
     item = api.get(f"/api/items/{used}")["id"]
     about = {"path": f"a/{HOSTILE}", "items": json.dumps([{"item": item, "object": HOSTILE}])}
     about["links"] = json.dumps([{"path": HOSTILE, "item": item}])
-    body, headers = form_body({"file": ("<b>x</b>.FCStd", b"x"), "comment": HOSTILE, **about})
+    body, headers = form_body({"file": ("<b>x</b>.FCStd", model_file(b"x")), "comment": HOSTILE, **about})
     assert api.call("POST", f"/api/documents/{sheet}/file", body=body, headers=headers).status == 201
     api.good("POST", "/api/auth/tokens", {"name": HOSTILE})
     api.good("POST", "/api/users", {"username": "odd", "display_name": HOSTILE})
@@ -438,7 +439,7 @@ def test_a_file_too_large_is_a_page(tmp_path: Path) -> None:
     with running_server(url, token=TOKEN, settings=small) as server, Api(server.base_url, TOKEN) as api:
         parent = api.item()
         visitor = enter(api, ADMIN)
-        body, headers = form_body({"file": ("x.FCStd", b"x" * 12_000)})
+        body, headers = form_body({"file": ("x.FCStd", model_file(b"x" * 12_000))})
         for of in (f"items/{parent}", f"documents/{uuid4()}"):  # files have a limit of their own
             assert api.call("POST", f"/api/{of}/file", body=body, headers=headers).status == 201
         body, headers = form_body({"csrf_token": visitor.csrf, "file": ("x.csv", b"x" * 12_000)})

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from hunting import over
 from large_boms import form_file
+from model_file import model_file
 from openpyxl import load_workbook
 from server_testing import Api, bom
 from web_visitor import Visitor
@@ -52,7 +53,7 @@ def test_lines_quantities_data_and_files_of_all_levels(api: Api, product: tuple[
     api.good("POST", bom(sub, "resolve"), {"decisions": [{"child_part_number": other, "action": "remove"}]})
     api.good("POST", bom(top), {"child_part_number": inner, "quantity": 1})
     api.good("PATCH", f"/api/items/{part}/properties", {"mass_kg": 2})
-    body, headers = form_file("part.FCStd", b"one")
+    body, headers = form_file("part.FCStd", model_file(b"one"))
     assert api.call("POST", f"/api/items/{part}/file", body=body, headers=headers).status == 201
     assert set(changes(api, top, since)) == {
         ("quantity", sub, part, "2", "3"),
@@ -113,7 +114,7 @@ def test_frozen_revisions_are_compared_as_they_are(
     api.good("PUT", bom(sub, part), {"notes": "glued"})
     api.good("PATCH", f"/api/items/{part}/properties", {"mass_kg": 2})
     api.good("PUT", f"/api/items/{other}", {"name": "Another name"})
-    body, headers = form_file("part.FCStd", b"one")
+    body, headers = form_file("part.FCStd", model_file(b"one"))
     assert api.call("POST", f"/api/items/{part}/file", body=body, headers=headers).status == 201
     expected = {
         ("line", sub, part, "notes: –", "notes: glued"),

@@ -469,6 +469,14 @@ def _attach(silo: RealSilo, _query: dict[str, str], body: Any, number: str) -> A
     return 201, {"id": str(uuid.uuid4()), "filename": name}
 
 
+def _attached(silo: RealSilo, _query: dict[str, str], _body: Any, number: str) -> Answer:
+    rows = [
+        {"id": str(uuid.uuid5(uuid.NAMESPACE_OID, name)), "filename": name, "size": len(content)}
+        for name, content in silo.one(number).attachments
+    ]
+    return 200, rows
+
+
 def _download(silo: RealSilo, _query: dict[str, str], _body: Any, number: str, revision: str = "") -> Answer:
     silo.check_storage()
     files = {} if silo.moods.storage == "gone" else silo.one(number).files
@@ -607,6 +615,7 @@ _ROUTES: tuple[tuple[str, str, Callable[..., Answer]], ...] = (
     (f"api/items/{_N}", "PUT", _update),
     (f"api/items/{_N}/revisions", "GET", _revisions),
     (f"api/items/{_N}/revisions/{_N}", "GET", _revision),
+    (f"api/items/{_N}/files", "GET", _attached),
     (f"api/items/{_N}/files", "POST", _attach),
     (f"api/items/{_N}/file", "POST", _upload),
     (f"api/items/{_N}/file", "GET", _download),

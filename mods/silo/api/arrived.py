@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from silo.api.revisions import checksum_of, has_file
+from silo.api.revisions import checksum_of, has_model
 from silo.api.transport import Cancel
 from silo.api.wire import Revision
 from silo.bom.errors import ConflictError, NotFoundError
@@ -31,7 +31,7 @@ def is_there(revisions: Iterable[Revision], file_name: str, sha256: str, number:
     """
     by_number = Path(file_name).suffix.lower() in REPACKED
     revisions_here = list(revisions)
-    files = [r for r in revisions_here if has_file(r)] or revisions_here  # some servers say nothing of files
+    files = [r for r in revisions_here if has_model(r)] or revisions_here  # some servers say nothing of files
     return any(
         checksum_of(r) == sha256 or (r.revision_number == number and (by_number or not checksum_of(r)))
         for r in files

@@ -17,10 +17,21 @@ from silo.api.multipart import FileBody, FileForm, Progress
 from silo.api.replies import error_of
 from silo.api.revisions import checksum_of
 from silo.api.transport import MAX_ERROR, ApiCall, Cancel, Transport
-from silo.api.wire import Document, HeldItem, KnownContent, LinkedFile, Release, Revision, Scene, Wire
+from silo.api.wire import (
+    Attachment,
+    Document,
+    HeldItem,
+    KnownContent,
+    LinkedFile,
+    Release,
+    Revision,
+    Scene,
+    Wire,
+)
 from silo.bom.errors import ConflictError, DocumentError, RejectedError, RouteMissingError, ServerFaultError
 from silo.bom.numbers import whole_number
 from silo.bom.text import with_allowed_characters
+from silo.file_kind import MODEL
 from silo.platform import remove_patiently, replacing
 
 if TYPE_CHECKING:
@@ -242,11 +253,31 @@ class FileCalls(Caller):
             )
         return revision
 
+    def attachments(self, part_number: str, /) -> list[Attachment]:
+        """Return the attachments of an item as they are now.
+
+        Raises RouteMissingError if the server lists none.
+        """
+        where = (f"the attachments of {part_number}", "items", part_number, "files")
+        return [
+            attachment for page, _ in self._all(Attachment, *where, keys=("files",)) for attachment in page
+        ]
+
     def attach_file(
-        self, part_number: str, path: Path | str, file_name: str, *, cancelled: Cancel | None = None
+        self,
+        part_number: str,
+        path: Path | str,
+        file_name: str,
+        *,
+        kind: str = "",
+        cancelled: Cancel | None = None,
     ) -> None:
-        """Send a file as an attachment of an item, which has no revisions; for a Silo without documents."""
-        with closing(FileForm(Path(path), {}, file_name, None, cancelled)) as form:
+        """Send a file as an attachment of an item; ``kind`` "": that of its content.
+
+        A Silo without documents keeps no kinds of attachments, and no revisions.
+        """
+        fields = {"kind": kind} if kind else {}
+        with closing(FileForm(Path(path), fields, file_name, None, cancelled)) as form:
             headers = {"Content-Type": form.content_type, "Accept": "application/json"}
             url = self._address.api("items", part_number, "files")
             subject = f"{file_name} beside {part_number}"
@@ -290,12 +321,12 @@ class FileCalls(Caller):
 def _upload_fields(
     comment: str, properties: Mapping[str, object] | None, sha256: str | None, origin: Origin | None
 ) -> dict[str, str]:
-    """Make the text parts of an upload: comment, properties, the hash that must arrive, and where the file
-    came from.
+    """Make the text parts of an upload: comment, kind, properties, the hash that must arrive, and where the
+    file came from.
 
-    A server that does not know the last two ignores them.
+    A server that does not know one of them ignores it.
     """
-    fields = {"comment": with_allowed_characters(comment)}
+    fields = {"comment": with_allowed_characters(comment), "kind": MODEL}
     if properties:
         fields["properties"] = as_json(properties).decode()
     if sha256:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from silo.api.wire import Revision
 from silo.bom.errors import NewerRevisionError
 from silo.checksums import bare_checksum, seen_as
+from silo.file_kind import MODEL, kind_by_name
 from silo.platform import no_device_name
 
 
@@ -20,7 +21,7 @@ class Standing:
     base
         the revision that it was made from; None where it is none of them.
     newest
-        the newest revision with a file; None where there is none.
+        the newest revision with a model; None where there is none.
     """
 
     base: Revision | None
@@ -54,9 +55,13 @@ class Standing:
         )
 
 
-def has_file(revision: Revision) -> bool:
-    """Return True if the revision has a file; a revision without one only changes properties."""
-    return bool(revision.file_checksum or revision.file_name or revision.file_key or revision.file_size)
+def has_model(revision: Revision) -> bool:
+    """Return True if the revision has a file that may be a model; a revision without a file only changes
+    properties. A server that knows no kinds keeps drawings among models: the name says so, then the content.
+    """
+    kind = revision.kind or kind_by_name(revision.file_name or "")
+    there = revision.file_checksum or revision.file_name or revision.file_key or revision.file_size
+    return bool(there) and kind in ("", MODEL)
 
 
 def standing(
@@ -70,7 +75,7 @@ def standing(
     seen
         the newest revision that a person has seen and decided about: its number and its checksum.
     """
-    files = sorted((r for r in revisions if has_file(r)), key=lambda r: r.revision_number)
+    files = sorted((r for r in revisions if has_model(r)), key=lambda r: r.revision_number)
     mine = [
         r
         for r in files
@@ -99,7 +104,7 @@ def other_name(path: str, revisions: Iterable[Revision]) -> str:
 
     "Save As" copies the identity along.
     """
-    named = [revision for revision in revisions if revision.file_name]
+    named = [revision for revision in revisions if revision.file_name and has_model(revision)]
     if not named:
         return ""
     newest = max(named, key=lambda revision: revision.revision_number)

@@ -150,10 +150,11 @@ class SupplierPart(Answer):
 
 
 class PartFile(Answer):
-    """A file of a part, and its path below ``/api/``."""
+    """A file of a part, and its path below ``/api/``; ``kind``: ``model``, or that of an attachment."""
 
     name: str
     path: str
+    kind: str = "model"
 
 
 class OrderPart(Answer):
@@ -528,6 +529,11 @@ class Revision(Record):
         the files that it links to; only where one revision is asked for.
     draft
         in the answer to an upload, if a revision of the item is released.
+    kind
+        ``model`` or a kind of attachment (:mod:`silo.file_kind`); None without a file, and where the server
+        knows no kinds.
+    document
+        in the answer to an upload that became an attachment: the UUID of the attachment's document.
     """
 
     revision_number: int = Field(validation_alias=AliasChoices("revision_number", "revision", "number"))
@@ -547,6 +553,8 @@ class Revision(Record):
     file_path: str | None = None
     links: list[LinkedFile] = Field(default_factory=list)
     draft: Draft | None = None
+    kind: str | None = None
+    document: str | None = None
 
 
 class Document(Revision):
@@ -593,8 +601,35 @@ class Approval(Record):
     comment: str = ""
 
 
+class Attachment(Record):
+    """A file beside the model of an item, with the fields of its newest revision.
+
+    id
+        the UUID of its document, which has its revisions.
+    kind
+        ``drawing``, ``step``, ``data_sheet``, ``picture``, ``certificate`` or ``other``.
+    """
+
+    id: str
+    part_number: str = ""
+    kind: str = "other"
+    revision_number: int = Field(default=0, validation_alias=AliasChoices("revision_number", "revision"))
+    file_name: str = Field(default="", validation_alias=AliasChoices("file_name", "filename", "name"))
+    file_checksum: str | None = Field(
+        default=None, validation_alias=AliasChoices("file_checksum", "checksum", "sha256")
+    )
+    file_size: int | None = Field(default=None, validation_alias=AliasChoices("file_size", "size"))
+    comment: str = ""
+    created_by: str | None = None
+    created_at: Time = None
+
+
 class FrozenFile(Record):
-    """A file as it was when a product was frozen: a revision of a document, its place, its content."""
+    """A file as it was when a product was frozen: a revision of a document, its place, its content.
+
+    kind, part_number
+        of an attachment: what it is, and the item that it lies at.
+    """
 
     document: str
     revision: int
@@ -602,6 +637,8 @@ class FrozenFile(Record):
     file_path: str | None = None
     sha256: str = ""
     size: int = 0
+    kind: str = "model"
+    part_number: str = ""
 
 
 # A whole number is no label: it means a revision of a file.
@@ -615,8 +652,9 @@ class Release(Record):
         ``review``, ``released``, ``obsolete``, ``rejected`` or ``withdrawn``.
     blocks
         what keeps it from being released, or kept it when it was, in sentences.
-    revision, files
-        the item's revision in it, and all files of the product; only if one release is asked for.
+    revision, files, attachments
+        the item's revision in it, all models of the product, and all attachments of its items; only if one
+        release is asked for.
     """
 
     label: str
@@ -634,6 +672,7 @@ class Release(Record):
     approvals: list[Approval] = Field(default_factory=list)
     revision: int | None = None
     files: list[FrozenFile] = Field(default_factory=list)
+    attachments: list[FrozenFile] = Field(default_factory=list)
 
 
 Finite = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]

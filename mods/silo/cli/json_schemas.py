@@ -271,7 +271,9 @@ PulledFile = _shape(
     kept=_described(str | None, "the copy of the user's file"),
 )
 Lost = _shape("Lost", file=str, link=str, reason=str)
-Pulled = _shape("Pulled", top=str, complete=bool, files=_many(PulledFile), missing=_many(Lost))
+Pulled = _shape(
+    "Pulled", top=str, complete=bool, files=_many(PulledFile), missing=_many(Lost), remarks=list[str]
+)
 Standing = _shape(
     "Standing",
     path=str,

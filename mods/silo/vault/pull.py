@@ -13,7 +13,7 @@ from __future__ import annotations
 import os
 import posixpath
 import shutil
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -24,6 +24,7 @@ from silo.bom.errors import DocumentError
 from silo.checksums import content_hash
 from silo.fcstd import Library
 from silo.fcstd.linked import identity_in
+from silo.file_kind import MODEL, kind_by_name
 from silo.file_state import FileState, file_state
 from silo.locator import refusal
 from silo.outbox.recorded import arrived, uid_of
@@ -71,6 +72,7 @@ class Pulled:
     top: Path
     files: tuple[PulledFile, ...]
     lost: tuple[LostLink, ...]
+    remarks: tuple[str, ...] = ()
 
     @property
     def complete(self) -> bool:
@@ -201,6 +203,7 @@ def place(tree: FileTree, into: Path | str, rules: Rules = Rules()) -> Pulled:
     lost = list(tree.lost)
     # The disk says which names are one file: by their case, their Unicode form, or a link.
     taken: dict[str, PulledFile] = {}
+    folders: dict[str, Path] = {}
     for one, where in zip(tree.files, places, strict=True):
         target = anchor.joinpath(*where.split("/"))
         if (before := taken.get(one_path(str(target)))) is not None:
@@ -214,6 +217,7 @@ def place(tree: FileTree, into: Path | str, rules: Rules = Rules()) -> Pulled:
             lost.append(LostLink(one.position, where, why))
             continue
         placed.append(_place(one, target, rules))
+        folders.setdefault(one.position, target.parent)
         taken[one_path(str(target))] = placed[-1]
         if placed[-1].state not in LEFT_ALONE:
             item = bool(one.part_number)
@@ -221,7 +225,33 @@ def place(tree: FileTree, into: Path | str, rules: Rules = Rules()) -> Pulled:
             noted[str(target)] = arrived(one.item, one.sha256, one.revision, server, uid, item=item)
     project = Project.of(anchor) or Project(one_path(str(anchor)))
     project.note({at: kept for path, kept in noted.items() if (at := project.place(path)) is not None})
-    return Pulled(placed[0].path, tuple(placed), tuple(lost))
+    top = placed[0].path
+    for one in tree.attachments:
+        beside = _place_beside(one, folders.get(one.position, top.parent), taken)
+        why = "its name is taken there" if beside is None else _in_the_way(beside, base)
+        if beside is None or why:
+            lost.append(LostLink(one.position, one.revision.file_name or "", why))
+            continue
+        placed.append(_place(one, beside, rules))
+        taken[one_path(str(beside))] = placed[-1]
+    return Pulled(top, tuple(placed), tuple(lost), tree.remarks)
+
+
+def _place_beside(one: Fetched, folder: Path, taken: Container[str]) -> Path | None:
+    """Find a free name for an attachment in the folder of its model; None if none is free.
+
+    A name that a model or another attachment has gets the part number in front, and so does each name that
+    FreeCAD would take for a model.
+    """
+    name = (one.revision.file_name or "file").replace("/", "_").replace("\\", "_").strip(". ") or "file"
+    if refusal(name) is not None:
+        name = f"_{name}"
+    for free in (name, f"{one.part_number}-{name}"):
+        target = folder / free
+        if one_path(str(target)) not in taken and kind_by_name(free) != MODEL:
+            return target
+    target = folder / f"{one.part_number}-{name}.{one.revision.kind}"
+    return None if one_path(str(target)) in taken else target
 
 
 def _in_the_way(target: Path, base: Path) -> str:
@@ -285,6 +315,7 @@ def pulled_json(pulled: Pulled, base: Path) -> dict[str, Any]:
             }
             for file in pulled.files
         ],
+        "remarks": list(pulled.remarks),
         "missing": [
             {"file": lost.position, "link": lost.path, "reason": lost.reason} for lost in pulled.lost
         ],

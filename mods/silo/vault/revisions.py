@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from silo.api.revisions import Standing, has_file
+from silo.api.revisions import Standing, has_model
 from silo.api.transport import Cancel
 from silo.api.wire import Revision
 from silo.bom.compare.states import ComparedAssembly
@@ -93,8 +93,8 @@ class RevisionBoms:
 
 
 def file_revisions(revisions: Sequence[Revision]) -> list[Revision]:
-    """Return the revisions with a file, newest first."""
-    return sorted(filter(has_file, revisions), key=lambda revision: revision.revision_number, reverse=True)
+    """Return the revisions with a model, newest first."""
+    return sorted(filter(has_model, revisions), key=lambda revision: revision.revision_number, reverse=True)
 
 
 def words(lines: Sequence[LineChange], most: int = 6) -> str:

@@ -4,6 +4,9 @@
 The files themselves say what they link to. The commit wrote down with which content; whose file that is now
 is asked of the server at each pull. Where it was not written down (an older client, another server), the item
 that the commit named says it, or the item's BOM and its file names.
+
+Only models are fetched as such. A server that knows no kinds may keep a drawing as the newest revision of a
+model: then the newest revision before it that is a model counts, and a remark says so.
 """
 
 from __future__ import annotations
@@ -23,6 +26,7 @@ from silo.api.transport import Cancel, stop_if
 from silo.api.wire import Item, KnownContent, LinkedFile, Release, Revision
 from silo.bom.errors import DocumentError, InputError, NotFoundError, RouteMissingError
 from silo.fcstd.linked import recorded_paths
+from silo.file_kind import is_model
 from silo.locator import refusal
 from silo.platform import scratch_folder
 from silo.vault.revisions import file_revisions
@@ -88,10 +92,19 @@ class LostLink:
 
 @dataclass(frozen=True)
 class FileTree:
-    """All files, the top first, and the links that lead nowhere."""
+    """All files, the top first, and the links that lead nowhere.
+
+    attachments
+        of the items of the files, if they are wanted: ``position`` is that of the model beside which an
+        attachment belongs.
+    remarks
+        what the user should know of the fetched files, in sentences.
+    """
 
     files: tuple[Fetched, ...]
     lost: tuple[LostLink, ...] = ()
+    attachments: tuple[Fetched, ...] = ()
+    remarks: tuple[str, ...] = ()
 
 
 @dataclass
@@ -102,8 +115,10 @@ class _Fetch:
     cancelled: Cancel | None
     progress: Progress
     most: int
+    with_attachments: bool = False
     files: dict[str, Fetched] = field(default_factory=dict)
     lost: list[LostLink] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
     release: Release | None = None
     _at: datetime | None = None
     _revisions: dict[str, list[Revision]] = field(default_factory=dict)
@@ -125,7 +140,9 @@ class _Fetch:
             if self.release is not None:
                 which = f"no file in revision {self.release.label}"
             raise InputError(f"{item.part_number} has {which} in Silo")
-        top = wanted[0]
+        top = self.model(holder, wanted[0], exact=number is not None)
+        if top is None:
+            raise InputError(f"{item.part_number} has no model in Silo, only other files")
         self._at = top.created_at
         # The top lies where it lay in its project: a link that steps out of its folder and back leads to one
         # place.
@@ -136,7 +153,29 @@ class _Fetch:
             left += self.fetch(position, other_revision, revision)
             if not left:
                 left = self.unlinked()
-        return FileTree(tuple(self.files.values()), tuple(self.lost))
+        beside = attachments_beside(self) if self.with_attachments else ()
+        return FileTree(tuple(self.files.values()), tuple(self.lost), tuple(beside), tuple(self.remarks))
+
+    def model(self, holder: Holder, revision: Revision, *, exact: bool = False) -> Revision | None:
+        """Return the revision if its file is a model, else the newest one before it that is; None for none.
+
+        Its file is fetched to know it, unless the server says kinds. ``exact``: no other revision will do.
+        """
+        if revision.kind is not None:
+            return revision
+        number = revision.revision_number
+        older = [other for other in self.revisions(holder) if other.revision_number <= number]
+        for other in older:
+            if is_model(self.content(holder.of, other)[0]):
+                if other.revision_number != number:
+                    self.remarks.append(
+                        f"{holder.part_number or holder.id}: revision {number} is no model, so revision "
+                        f"{other.revision_number} was taken"
+                    )
+                return other
+            if exact or self.release is not None:
+                return None
+        return None
 
     def frozen(self, holder: Holder) -> Revision | None:
         """Return the revision of a file in the release that is being fetched; None if the file is not
@@ -189,6 +228,12 @@ class _Fetch:
         if len(self.files) >= self.most:
             raise InputError(f"more than {self.most} files are not fetched in one go")
         self.progress(posixpath.basename(position), len(self.files))
+        taken = self.model(holder, revision)
+        if taken is None:
+            number = holder.part_number or position
+            self.lost.append(LostLink(position, position, f"{number} has no model in Silo, only other files"))
+            return
+        revision = taken
         content, sha256 = self.content(holder.of, revision)
         revisions = tuple(self.revisions(holder))
         self.files[position] = Fetched(
@@ -210,6 +255,34 @@ class _Fetch:
             sha256 = download_revision(self.client, of, target, number, checksum, cancelled=self.cancelled)
             self._contents[key] = (target, sha256)
         return self._contents[key]
+
+    def numbers_in(self, file: Fetched) -> list[str]:
+        """Return the part numbers of the items in a file: of its own item, or of all that it holds."""
+        if file.part_number:
+            return [file.part_number]
+        try:
+            return [
+                held.part_number for held in self.client.get_document(file.item).holds if held.part_number
+            ]
+        except (NotFoundError, RouteMissingError):
+            return []
+
+    def attached(self, numbers: Iterable[str]) -> Iterator[tuple[str, str, str, str, Revision]]:
+        """Yield each attachment: part number, name, kind, document, revision."""
+        if self.release is not None:
+            for file in self.release.attachments:
+                kept = Revision(revision_number=file.revision, file_checksum=file.sha256)
+                yield file.part_number, file.file_name, file.kind, file.document, kept
+            return
+        for number in numbers:
+            try:
+                several = self.client.attachments(number)
+            except RouteMissingError:
+                self.remarks.append("this Silo lists no attachments, so none were fetched")
+                return
+            for each in several:
+                kept = Revision(revision_number=each.revision_number, file_checksum=each.file_checksum)
+                yield number, each.file_name, each.kind, each.id, kept
 
     def revisions(self, holder: Holder) -> list[Revision]:
         if holder.of not in self._revisions:
@@ -375,6 +448,27 @@ class _Children:
         return by_path, by_name
 
 
+def attachments_beside(fetch: _Fetch) -> Iterator[Fetched]:
+    """Fetch the attachments of the items whose models were fetched, or those that a release holds."""
+    places: dict[str, str] = {}
+    for position, file in fetch.files.items():
+        for number in fetch.numbers_in(file):
+            places.setdefault(number, position)
+    top = next(iter(fetch.files))
+    for number, name, kind, document, revision in fetch.attached(places):
+        stop_if(fetch.cancelled)
+        fetch.progress(name, len(fetch.files))
+        position = places.get(number, top)
+        try:
+            content, sha256 = fetch.content(DocumentId(document), revision)
+            earlier = fetch.client.revisions(DocumentId(document))
+        except (NotFoundError, RouteMissingError) as error:
+            fetch.lost.append(LostLink(position, name, f"the {kind} of {number} cannot be fetched: {error}"))
+            continue
+        kept = revision.model_copy(update={"file_name": name, "kind": kind})
+        yield Fetched(position, number, document, kept, content, sha256, tuple(earlier))
+
+
 def _place_in_project(path: str) -> str:
     """Return the path with a safe name; without its folder if that is not inside a project."""
     folder, name = posixpath.split(path.replace("\\", "/"))
@@ -409,6 +503,7 @@ def fetched(
     cancelled: Cancel | None = None,
     progress: Progress = lambda _name, _count: None,
     most: int = MOST_FILES,
+    attachments: bool = False,
 ) -> Iterator[FileTree]:
     """Fetch the files of an item, and yield their tree in a scratch folder that ends with the block.
 
@@ -422,5 +517,6 @@ def fetched(
     number = revision if isinstance(revision, int) else None
     release = client.get_release(item.part_number, revision) if isinstance(revision, str) else None
     with scratch_folder("silo-pull-") as scratch:
-        fetch = _Fetch(client, Path(scratch), number is not None, cancelled, progress, most, release=release)
+        how = (number is not None, cancelled, progress, most, attachments)
+        fetch = _Fetch(client, Path(scratch), *how, release=release)
         yield fetch.tree(item, number)

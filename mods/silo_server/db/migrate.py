@@ -10,18 +10,21 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+from uuid import uuid4
 
 from sqlalchemy import (
     BigInteger,
     Boolean,
     Column,
+    Connection,
     Float,
     ForeignKey,
     Index,
     Integer,
     MetaData,
+    Row,
     String,
     Table,
     Text,
@@ -34,6 +37,7 @@ from sqlalchemy import (
 
 from silo.bom.errors import ConfigError, listed
 from silo.bom.units import known_unit, stored_unit
+from silo.file_kind import MODEL, kind_by_name, kind_of
 from silo_server.db.database import Database
 from silo_server.db.tables import NAMES, needed, only, primary
 from silo_server.db.transaction import MIGRATION_LOCK
@@ -48,9 +52,14 @@ Stamp = String(32)
 Key = String(64).with_variant(String(64, collation="C"), "postgresql")
 Uuid = String(36)
 
+# What a step finds in the options of its context: the folder of the files, and where it says what it left.
+FILES, LEFT = "silo_files", "silo_left"
 
-def upgrade(db: Database, revision: str = "") -> None:
+
+def upgrade(db: Database, revision: str = "") -> list[str]:
     """Apply the steps that are missing up to ``revision`` (or to the newest), in one transaction.
+
+    Returns what a step could not decide and left as it is, in sentences.
 
     SQLite's write transaction and PostgreSQL's advisory lock keep a second server that starts at the same
     time waiting until the first is through. Raises ConfigError for a schema that this version does not read.
@@ -69,16 +78,18 @@ def upgrade(db: Database, revision: str = "") -> None:
             check_revision(before)
         missing = [step for step in STEPS if (before or "") < step <= (revision or max(STEPS))]
         if not missing:
-            return
+            return []
         from alembic.migration import MigrationContext  # late: most starts change nothing
         from alembic.operations import Operations
 
-        names = {"target_metadata": MetaData(naming_convention=NAMES)}
-        op = Operations(MigrationContext.configure(connection, opts=names))
+        left: list[str] = []
+        opts = {"target_metadata": MetaData(naming_convention=NAMES), FILES: db.settings.storage, LEFT: left}
+        op = Operations(MigrationContext.configure(connection, opts=opts))
         for step in missing:
             STEPS[step](op)
         connection.execute(version.delete())
         connection.execute(version.insert().values(version_num=missing[-1]))
+        return left
 
 
 def check_revision(revision: str, holder: str = "database") -> None:
@@ -667,6 +678,127 @@ def _with_stored_unit(text: str | None) -> str | None:
     return json.dumps(kept, separators=(",", ":"), ensure_ascii=False)
 
 
+def _attachments(op: Operations) -> None:
+    """Sort the files by their content: models stay, all others become attachments with their revisions.
+
+    A revision of an item that holds an attachment keeps its number and its file, which releases name; it is
+    marked with its kind. A file that is not in the store is sorted by its name.
+    """
+    bind = op.get_bind()
+    number = "INTEGER" if bind.dialect.name == "sqlite" else "BIGINT"
+    op.add_column("documents", Column("kind", String(16), nullable=False, server_default="model"))
+    # In words of SQL: SQLite takes a foreign key with a new column only like this, without a new table.
+    op.execute(
+        f"ALTER TABLE documents ADD COLUMN attached_to {number} "
+        "CONSTRAINT fk_documents_attached_to_items REFERENCES items (id)"
+    )
+    op.add_column("documents", Column("removed_at", Stamp))
+    op.create_index("ix_documents_attached_to", "documents", ["attached_to"])
+    op.add_column("revisions", Column("kind", String(16)))
+    tables = MetaData()
+    tables.reflect(bind, only=["items", "documents", "revisions", "document_items", "document_links"])
+    items, documents, revisions = (tables.tables[name] for name in ("items", "documents", "revisions"))
+    with_file = select(revisions).where(revisions.c.file_checksum.is_not(None)).order_by(revisions.c.id)
+    folder, left = op.get_context().opts[FILES], op.get_context().opts[LEFT]
+    lost, others = [], []
+    for row in bind.execute(with_file).all():
+        checksum, name = row.file_checksum, row.file_name or ""
+        try:
+            kind = kind_of(folder / checksum[:2] / checksum[2:4] / checksum, name)
+        except OSError:
+            kind = kind_by_name(name) or MODEL
+            lost.append(f"{name or checksum} ({kind})")
+        if kind != MODEL:
+            others.append((row, kind))
+    if lost:
+        left.append(
+            f"{len(lost)} files are not in the server's store, so their names decide what they are: "
+            + ", ".join(lost[:20])
+            + (", …" if len(lost) > 20 else "")
+        )
+    bind.execute(revisions.update().where(revisions.c.file_checksum.is_not(None)).values(kind=MODEL))
+    if not others:
+        return
+    bought = _bought(bind, items)
+    of_documents: dict[int, list[tuple[Row[Any], str]]] = {}
+    for row, kind in others:
+        if kind == "drawing" and row.item_id in bought and (row.file_name or "").lower().endswith(".pdf"):
+            kind = "data_sheet"
+        bind.execute(revisions.update().where(revisions.c.id == row.id).values(kind=kind))
+        of_documents.setdefault(row.document_id, []).append((row, kind))
+    for document_id, files in of_documents.items():
+        document = bind.execute(documents.select().where(documents.c.id == document_id)).one()
+        _follow_model(bind, tables, document)
+        if document.item_id is None:
+            names = ", ".join(row.file_name or "" for row, _ in files[:5])
+            left.append(f"the document {document.uuid} of no item holds files that are no models: {names}")
+            continue
+        _attach_all(bind, tables, document.item_id, files)
+
+
+def _bought(bind: Connection, items: Table) -> set[int]:
+    found = set()
+    for row in bind.execute(
+        select(items.c.id, items.c.sourcing_type, items.c.supplier_parts, items.c.properties)
+    ):
+        supplied = row.supplier_parts not in (None, "[]") or json.loads(row.properties).get("supplier")
+        if row.sourcing_type == "purchased" or (not row.sourcing_type and supplied):
+            found.add(row.id)
+    return found
+
+
+def _follow_model(bind: Connection, tables: MetaData, document: Row[Any]) -> None:
+    """Let a document be what its newest model is; without any, it holds no item, and has the newest kind."""
+    documents, revisions = tables.tables["documents"], tables.tables["revisions"]
+    items_in, links_of = tables.tables["document_items"], tables.tables["document_links"]
+    its = revisions.select().where(revisions.c.document_id == document.id)
+    newest_first = bind.execute(its.order_by(revisions.c.revision_number.desc())).all()
+    model = next((row for row in newest_first if row.kind == MODEL), None)
+    if model is not None and model.revision_number == document.current_revision:
+        return
+    this = documents.c.id == document.id
+    bind.execute(links_of.delete().where(links_of.c.document_id == document.id))
+    if model is None:
+        bind.execute(items_in.delete().where(items_in.c.document_id == document.id))
+        now = (
+            {"current_revision": 0}
+            if document.item_id is not None
+            else {"kind": newest_first[0].kind, "current_revision": newest_first[0].revision_number}
+        )
+        bind.execute(documents.update().where(this).values(now))
+        return
+    bind.execute(documents.update().where(this).values(current_revision=model.revision_number))
+    links = json.loads(model.links or "[]")
+    targets = dict.fromkeys(link.get("document") or link.get("item") or "" for link in links)
+    rows = [
+        {"document_id": document.id, "target": target} for target in targets if target and len(target) <= 36
+    ]
+    if rows:
+        bind.execute(links_of.insert(), rows)
+
+
+def _attach_all(
+    bind: Connection, tables: MetaData, item_id: int, files: Sequence[tuple[Row[Any], str]]
+) -> None:
+    """Make an attachment of all files of one kind and name, with a revision for each."""
+    documents, revisions = tables.tables["documents"], tables.tables["revisions"]
+    alike: dict[tuple[str, str], list[Row[Any]]] = {}
+    for row, kind in files:
+        alike.setdefault((kind, (row.file_name or "").casefold()), []).append(row)
+    for (kind, _), rows in alike.items():
+        first = {"created_at": rows[0].created_at, "created_by": rows[0].created_by}
+        about = {"kind": kind, "attached_to": item_id, "current_revision": len(rows)}
+        made = documents.insert().values(uuid=str(uuid4()), **about, **first)
+        document_id = bind.execute(made.returning(documents.c.id)).scalar_one()
+        kept = ("comment", "status", "file_name", "file_checksum", "file_size", "created_at", "created_by")
+        copies = [
+            {name: getattr(row, name) for name in kept}
+            | {"document_id": document_id, "revision_number": number, "properties": "{}", "kind": kind}
+            for number, row in enumerate(rows, start=1)
+        ]
+        bind.execute(revisions.insert(), copies)
+
+
 STEPS: dict[str, Callable[[Operations], None]] = {
     "0007": _first_schema,
     "0008": _answers,
@@ -681,4 +813,5 @@ STEPS: dict[str, Callable[[Operations], None]] = {
     "0018": _follows_and_assignees,
     "0019": _documents_that_became_others,
     "0020": _units,
+    "0021": _attachments,
 }

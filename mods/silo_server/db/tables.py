@@ -123,7 +123,8 @@ number_counters = Table(
     needed("last_serial", Integer),
 )
 
-# A document is a file: its revisions are those of its item with a file, or, without an item, its own.
+# A document is a file: its revisions are those of its item with a model, or, without an item, its own. An
+# attachment is a document of another kind than ``model``, beside the item ``attached_to``.
 documents = Table(
     "documents",
     metadata,
@@ -134,6 +135,10 @@ documents = Table(
     needed("created_at", Stamp),
     needed("created_by", String(64)),
     Column("became", Uuid),
+    needed("kind", String(16), server_default="model"),
+    Column("attached_to", Id, ForeignKey("items.id")),
+    Column("removed_at", Stamp),
+    Index(None, "attached_to"),
     sqlite_autoincrement=True,
 )
 
@@ -175,6 +180,7 @@ revisions = Table(
     Column("base_revision", Integer),
     Column("file_path", Text),
     Column("links", Text),
+    Column("kind", String(16)),
     UniqueConstraint("item_id", "revision_number"),
     UniqueConstraint("document_id", "revision_number"),
     Index(None, "file_checksum"),

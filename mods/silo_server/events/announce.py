@@ -3,7 +3,7 @@
 
 Names: the spec's ``bom_merge``; the real Silo's ``item.created``, ``item.updated``, ``item.deleted``,
 ``revision.created``, ``server.state``; ours ``bom.updated`` for changes of a BOM that are no merge, and
-``document.revised`` for a file that is no item's.
+``document.revised`` for a file that is no item's, ``file.attached`` and ``file.removed`` for attachments.
 """
 
 from __future__ import annotations
@@ -41,6 +41,17 @@ def revision_created(tx: Tx, of: Item | Document, revision: Revision) -> None:
         _about(tx, "revision.created", of, {"part_number": of.part_number, "id": of.uuid, **data})
     else:
         tx.emit(NewEvent("document.revised", dumps({"document": of.uuid, **data})))
+
+
+def file_attached(tx: Tx, item: Item, kind: str, file_name: str, number: int, comment: str) -> None:
+    """Announce a new revision of an attachment, or its new kind."""
+    data = {"kind": kind, "file_name": file_name, "revision_number": number, "comment": comment}
+    _about(tx, "file.attached", item, {**_named(item), **data, "user": tx.actor.username})
+
+
+def file_removed(tx: Tx, item: Item, kind: str, file_name: str) -> None:
+    data = {"kind": kind, "file_name": file_name, "user": tx.actor.username}
+    _about(tx, "file.removed", item, {**_named(item), **data})
 
 
 def bom_updated(tx: Tx, item: Item, kind: str, summary: str) -> None:

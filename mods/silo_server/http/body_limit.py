@@ -25,7 +25,7 @@ BODY_PACE = 8 * 1024
 # [s] So often a request that waits for its body checks if the server is about to stop.
 CLOSING_SECONDS = 0.5
 CLOSE = {"Connection": "close"}
-UPLOAD_PATH = re.compile(r"/(?:api/)?(?:items|documents)/[^/]+/file$")
+UPLOAD_PATH = re.compile(r"/(?:api/)?(?:items|documents)/[^/]+/files?$")
 
 
 class BodyLimit:

@@ -23,6 +23,7 @@ from silo.api import wire
 from silo.api.wire import FactSource, HeldItem, ItemTexts, LinkedFile
 from silo.bom.errors import NotFoundError, RejectedError
 from silo.bom.numbers import whole_number
+from silo.file_kind import ATTACHMENT_KINDS, MODEL
 from silo_server.db.answers import KeptAnswer, KeyedRequest, earlier_answer, keep_answer
 from silo_server.db.transaction import Tx
 from silo_server.fields import to_wire
@@ -49,7 +50,7 @@ from silo_server.routes.models import (
 )
 from silo_server.routes.requests import BoundedRoute, ExpectedVersion, idempotency_key, json_body
 from silo_server.schema import describe, describe_form, find_schema, schemas
-from silo_server.services import documents, items, revisions, scene, search
+from silo_server.services import attachments, documents, items, revisions, scene, search
 from silo_server.services.bom.last_sync import NEVER, LastSync, last_sync, last_syncs
 from silo_server.services.documents import (
     documents_by_uuid,
@@ -63,6 +64,7 @@ from silo_server.services.documents import (
 )
 from silo_server.services.drawn_picture import keep_picture
 from silo_server.services.field_checks import sha256_or_none, text_problem
+from silo_server.services.file_store import StoredFile
 from silo_server.services.product.where_used import where_used
 from silo_server.services.releases import draft_of
 from silo_server.services.revisions import RevisionOrigin, revision_to_wire
@@ -299,6 +301,11 @@ BINARY: dict[int | str, dict[str, Any]] = {
 }
 _FORM: openapi.Schema = {
     "file": {"type": "string", "format": "binary"},
+    "kind": {
+        "type": "string",
+        "enum": ["", MODEL, *ATTACHMENT_KINDS],
+        "description": "else that of the content; what is no model becomes an attachment of the item",
+    },
     "comment": openapi.text(10_000),
     "properties": {"type": "string", "description": "a JSON object"},
     "sha256": {**openapi.SHA256, "description": "of the file; another content is refused"},
@@ -321,7 +328,7 @@ _FORM: openapi.Schema = {
 }
 UPLOAD = {
     **openapi.refused(
-        "properties that are no JSON object, links or items that are no such list, "
+        "properties that are no JSON object, links or items that are no such list, a model that is none, "
         "and a sha256 that is not that of the file"
     ),
     "requestBody": {
@@ -393,6 +400,9 @@ def add_revision(call: Editor, part_number: str, body: RevisionBody) -> Response
 async def upload_file(call: Editor, part_number: str) -> Response:
     """Upload a file (form part ``file``, texts ``comment`` and ``properties``) as a new revision.
 
+    The item's own file is a model. Any other content becomes an attachment of the item; the answer is then
+    the revision of that attachment, with its ``kind`` and its ``document``.
+
     ``Idempotency-Key`` makes a repeat give the revision that the first request made. With ``base_revision``
     a file is refused (409 ``newer_revision``, with that revision) if somebody has committed one since.
     """
@@ -418,6 +428,9 @@ async def receive(call: Call, find: Find) -> Response:
             raise RejectedError("file: wanted a multipart form with the file in a part named 'file'")
         if problem := text_problem(comment or "", 10_000) or text_problem(raw or "", _MAX_FIELD):
             raise RejectedError(f"comment, properties: {problem}")
+        kind = form.get("kind") or ""
+        if kind not in ("", MODEL, *ATTACHMENT_KINDS):
+            raise RejectedError(f"kind: wanted {MODEL} or {' or '.join(ATTACHMENT_KINDS)}")
         sha256 = sha256_or_none("sha256", form.get("sha256"))
         properties = _properties(raw if isinstance(raw, str) else None)
         origin = RevisionOrigin(
@@ -436,7 +449,7 @@ async def receive(call: Call, find: Find) -> Response:
             return json_answer(answer_json, 201)
 
         def work() -> Response:
-            return store_file(call, find, file, text, answer, properties, key, digest, origin)
+            return store_file(call, find, file, text, answer, properties, key, digest, origin, str(kind))
 
         return await anyio.to_thread.run_sync(work)
 
@@ -503,8 +516,12 @@ def store_file(
     key: str | None = None,
     sha256: str = "",
     origin: RevisionOrigin | None = None,
+    kind: str = "",
 ) -> Response:
-    """Store an uploaded file as a new revision, for the API and the pages.
+    """Store an uploaded file as a new revision, for the API and the pages: of the model or an attachment.
+
+    kind
+        "": that of the content.
 
     ``answer`` is made before the commit.
     """
@@ -512,22 +529,27 @@ def store_file(
     with call.read() as tx:
         find(tx, False)  # before anything is written to the disk
     stored = call.server.files.keep(file.filename or "file", file.file)
-    if sha256 and stored.checksum != sha256:
-        raise RejectedError(
-            f"sha256: the file arrived as {stored.checksum}, and {sha256} was sent; no revision was made"
-        )
+    checked_hash(stored, sha256)
     with call.write() as tx:
         of = find(tx, True)
         told = asdict(origin)
         if not told["former"]:  # a repeat of a request that was made before there was this field
             del told["former"]
-        content = (stored.name, stored.checksum, comment, properties, told)
-        kind = "upload" if isinstance(of, Item) else "upload document"
-        request = KeyedRequest.of(f"{kind} {of.id}", key, content)
+        content = (stored.name, stored.checksum, comment, properties, told, *([kind] if kind else ()))
+        what = "upload" if isinstance(of, Item) else "upload document"
+        request = KeyedRequest.of(f"{what} {of.id}", key, content)
         if earlier := earlier_answer(tx, request):
-            return answer(tx, of, revisions.get_revision(tx, of, int(earlier.text)))
-        if isinstance(of, Document) and properties:
-            raise RejectedError("properties: a document without an item has none")
+            number, _, document = earlier.text.partition(" ")
+            if document:
+                of = documents.get_document(tx, document)
+            return answer(tx, of, revisions.get_revision(tx, of, int(number)))
+        attached = _attached(tx, of, stored, kind, comment)
+        if properties and (attached or isinstance(of, Document)):
+            raise RejectedError("properties: only the model of an item has any")
+        if attached is not None:
+            revision = revisions.get_revision(tx, attached, attached.current_revision)
+            keep_answer(tx, request, KeptAnswer(f"{revision.revision_number} {attached.uuid}"))
+            return answer(tx, attached, revision)
         merged = {**of.properties, **properties} if isinstance(of, Item) and properties is not None else None
         revision = revisions.add_revision(
             tx, of, comment=comment, properties=merged, file=stored, origin=origin
@@ -543,6 +565,25 @@ def _former(raw: object) -> str:
     if not isinstance(raw, str):
         raise RejectedError("former: wanted the UUID of a document")
     return items.normal_uuid(raw)
+
+
+def _attached(tx: Tx, of: Item | Document, stored: StoredFile, kind: str, comment: str) -> Document | None:
+    """Attach a file that is no model, or is meant as none, to the item; None if it is the model's."""
+    if not revisions.takes_models(of) and isinstance(of, Document):
+        made, _ = attachments.revise(tx, of, stored, comment)
+    elif kind == MODEL or (not kind and stored.kind == MODEL) or isinstance(of, Document):
+        return None
+    else:
+        made, _ = attachments.attach(tx, of, stored, kind, comment)
+    return documents.get_document(tx, made.id)
+
+
+def checked_hash(stored: StoredFile, sha256: str) -> None:
+    """Raise RejectedError if another content arrived than ``sha256`` ("": any) says was sent."""
+    if sha256 and stored.checksum != sha256:
+        raise RejectedError(
+            f"sha256: the file arrived as {stored.checksum}, and {sha256} was sent; no revision was made"
+        )
 
 
 def _base_revision(raw: object) -> int | None:

@@ -240,6 +240,12 @@ class ContentsOut(BaseModel):
     contents: list[wire.KnownContent]
 
 
+class AttachmentsOut(BaseModel):
+    """The attachments of an item."""
+
+    files: list[wire.Attachment]
+
+
 class RevisionBody(RequestBody):
     """``POST /api/items/{pn}/revisions``: a revision without a file."""
 

@@ -61,7 +61,10 @@ class ReleasesOut(wire.Answer):
 
 
 def release_to_wire(tx: Tx, release: Release, *, whole: bool = False) -> dict[str, Any]:
-    """Return a revision as the API sends it; ``whole``: with the item's revision and the product's files."""
+    """Return a revision as the API sends it; ``whole``: with the item's revision and the product's files.
+
+    Raises TooLargeError.
+    """
     release_json = {
         **to_wire(release, "id"),
         "blocks": releases.blocks_of(tx, release) if release.status == "review" else release.blocks,
@@ -69,7 +72,8 @@ def release_to_wire(tx: Tx, release: Release, *, whole: bool = False) -> dict[st
     }
     if whole:
         record = releases.read_record(tx, release.record)
-        release_json |= {"revision": record["revision"], "files": record["files"]}
+        models, beside = frozen.frozen_files(tx, release.record)
+        release_json |= {"revision": record["revision"], "files": models, "attachments": beside}
     return release_json
 
 

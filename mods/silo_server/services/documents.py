@@ -3,7 +3,8 @@
 
 A file of exactly one item is the item's document: it has the item's UUID and the item's revision numbers, and
 the item's routes show it. A file of several items or of none (a part library, a spreadsheet) has a UUID that
-its first upload names, and revision numbers of its own.
+its first upload names, and revision numbers of its own. So has an attachment
+(:mod:`silo_server.services.attachments`), which is a document of another kind than a model.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, delete, insert, select, update
 
 from silo.bom.errors import NotFoundError
+from silo.file_kind import MODEL
 from silo_server.db.rows import insert_rows, one_of
 from silo_server.db.tables import document_items, document_links, documents, items, revisions
 from silo_server.db.transaction import Tx
@@ -43,6 +45,7 @@ class ShownDocument:
     comment: str
     created_at: str
     created_by: str
+    kind: str
     holds: tuple[Mapping[str, str], ...] = ()
 
 
@@ -91,9 +94,9 @@ def document_of(tx: Tx, item: Item) -> Document:
     return make_document(tx, uuid, item.id)
 
 
-def make_document(tx: Tx, uuid: str, item_id: int | None = None) -> Document:
-    """Make a document that has no revision yet."""
-    row = {"uuid": uuid, "item_id": item_id, "current_revision": 0}
+def make_document(tx: Tx, uuid: str, item_id: int | None = None, **more: Any) -> Document:
+    """Make a document that has no revision yet; ``more`` are the columns of an attachment."""
+    row = {"uuid": uuid, "item_id": item_id, "current_revision": 0, **more}
     tx.conn.execute(insert(documents).values(**row, created_at=tx.stamp, created_by=tx.actor.username))
     return get_document(tx, uuid)
 
@@ -144,11 +147,11 @@ def note_former(tx: Tx, document: Document, former: str) -> None:
 
 
 def of_contents(tx: Tx, contents: Iterable[str]) -> list[KnownContent]:
-    """Find the documents that have a revision with one of these contents, the newest revision first."""
+    """Find the documents that have a model with one of these contents, the newest revision first."""
     query = (
         select(documents.c.uuid, revisions)
         .join(revisions, revisions.c.document_id == documents.c.id)
-        .where(one_of(tx, revisions.c.file_checksum, set(contents)))
+        .where(one_of(tx, revisions.c.file_checksum, set(contents)), revisions.c.kind == MODEL)
         .order_by(revisions.c.id.desc())
     )
     rows = tx.conn.execute(query).all()

@@ -17,18 +17,21 @@ from pathlib import Path
 from typing import IO
 
 from silo.bom.errors import NotFoundError
+from silo.file_kind import MODEL, kind_of
 from silo.platform import no_device_name, remove_patiently, replace_patiently, sync_folder
 from silo_server.services.thumbnails import read_thumbnail
 
 
 @dataclass(frozen=True, slots=True)
 class StoredFile:
-    """A file in the store: what it was called, its SHA-256 and size, and its thumbnail's SHA-256."""
+    """A file in the store: what it was called, its SHA-256 and size, its thumbnail's SHA-256, and its kind by
+    its content (:mod:`silo.file_kind`)."""
 
     name: str
     checksum: str
     size: int
     thumbnail_key: str | None = None
+    kind: str = MODEL
 
 
 CHUNK = 1024 * 1024
@@ -48,11 +51,12 @@ class FileStore:
         return path
 
     def keep(self, name: str, source: IO[bytes]) -> StoredFile:
-        """Store an upload; the same content is stored once. Extracts the thumbnail of an FCStd file."""
+        """Store an upload; the same content is stored once. Extracts the thumbnail of a model."""
         checksum, size = self._write(iter(lambda: source.read(CHUNK), b""))
-        thumbnail = read_thumbnail(self._place(checksum))
+        kind = kind_of(self._place(checksum), name)
+        thumbnail = read_thumbnail(self._place(checksum)) if kind == MODEL else None
         key = self._write([thumbnail])[0] if thumbnail else None
-        return StoredFile(clean_name(name), checksum, size, key)
+        return StoredFile(clean_name(name), checksum, size, key, kind)
 
     def holds(self, checksum: str) -> bool:
         """Return True if the file with this hash is here and undamaged; reads all of it."""

@@ -15,11 +15,12 @@ from dataclasses import dataclass
 from decimal import ROUND_CEILING, Decimal
 from typing import NamedTuple
 
-from sqlalchemy import insert, or_, select, update
+from sqlalchemy import false, insert, or_, select, update
 
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError, counted, listed
 from silo.bom.quantities import exact_product, exact_sum, plain
 from silo.bom.units import converted, unit_of
+from silo.file_kind import ATTACHMENT_KINDS, MODEL
 from silo_server.db.rows import one_of
 from silo_server.db.tables import document_items, documents, items, orders, revisions
 from silo_server.db.transaction import Tx
@@ -89,10 +90,11 @@ class Recorded:
 
 
 class PartFile(NamedTuple):
-    """A file of a part: the newest of its kind (by the end of its name)."""
+    """The newest revision of a file of a part: its model, or an attachment of a kind."""
 
     name: str
     path: str
+    kind: str = MODEL
 
 
 class OrderRow(NamedTuple):
@@ -315,7 +317,7 @@ def _ids_of(tx: Tx, items_by_id: Mapping[int, Item]) -> dict[int, int]:
 
 
 def _files(tx: Tx, item_ids: Collection[int], release: Release | None) -> dict[int, list[PartFile]]:
-    """Find the files that each item is in, the newest of each kind: drawing, STEP, FreeCAD file.
+    """Find the attachments of each item and the models that it is in: the drawing first, the model last.
 
     Revisions are never changed, so those until a product was frozen are those of its release.
     """
@@ -324,33 +326,43 @@ def _files(tx: Tx, item_ids: Collection[int], release: Release | None) -> dict[i
     holders: dict[int, set[int]] = {}
     for document_id, item_id in pairs:
         holders.setdefault(document_id, set()).add(item_id)
-    row = revisions.c
+    row, doc = revisions.c, documents.c
+    kept_until = "" if release is None else release.frozen_at
+    there = or_(doc.removed_at.is_(None), (doc.removed_at > kept_until) if kept_until else false())
     query = (
         select(
             row.item_id,
             row.document_id,
             row.revision_number,
             row.file_name,
-            documents.c.uuid,
+            row.kind,
+            doc.uuid,
+            doc.attached_to,
             items.c.part_number,
         )
-        .join(documents, documents.c.id == row.document_id, isouter=True)
+        .join(documents, doc.id == row.document_id)
         .join(items, items.c.id == row.item_id, isouter=True)
         .where(
-            row.file_name.is_not(None),
-            or_(one_of(tx, row.item_id, item_ids), one_of(tx, row.document_id, holders)),
+            or_(
+                (row.kind == MODEL)
+                & or_(one_of(tx, row.item_id, item_ids), one_of(tx, row.document_id, holders)),
+                one_of(tx, doc.attached_to, item_ids) & there,
+            )
         )
         .order_by(row.revision_number)
     )
     if release is not None:
         query = query.where(row.created_at <= release.frozen_at)
-    files: dict[int, dict[tuple[int, str], PartFile]] = {}
-    for of, document_id, number, name, uuid, part_number in tx.conn.execute(query):
-        kind = name.rpartition(".")[2].casefold()
+    files: dict[int, dict[int, PartFile]] = {}
+    for of, document_id, number, name, kind, uuid, attached_to, part_number in tx.conn.execute(query):
         at = f"items/{part_number}" if part_number else f"documents/{uuid}"
-        for item_id in holders.get(document_id, set()) | ({of} & set(item_ids)):
-            files.setdefault(item_id, {})[document_id or 0, kind] = PartFile(name, f"{at}/file/{number}")
-    return {item_id: sorted(kinds.values()) for item_id, kinds in files.items()}
+        for item_id in holders.get(document_id, set()) | ({of, attached_to} & set(item_ids)):
+            files.setdefault(item_id, {})[document_id] = PartFile(name, f"{at}/file/{number}", kind)
+    order = (*ATTACHMENT_KINDS, MODEL)
+    return {
+        item_id: sorted(found.values(), key=lambda file: (order.index(file.kind), file))
+        for item_id, found in files.items()
+    }
 
 
 # --- What was ordered ---

@@ -2,6 +2,7 @@
 """Revisions: append-only snapshots of an item's properties, each with the file that was uploaded, if any.
 
 An item and its document count their revisions together; a document without an item has its own numbers.
+The file of an item, and of a document that is no attachment, is a model.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from sqlalchemy import ColumnElement, Row, func, insert, select, update
 
 from silo.api.wire import FACTS, FactSource
 from silo.bom.compare.base_revision import base_revision_of, would_undo
-from silo.bom.errors import NewerRevisionError, NotFoundError
+from silo.bom.errors import NewerRevisionError, NotFoundError, RejectedError
+from silo.file_kind import MODEL
 from silo_server.db.tables import items, revisions
 from silo_server.db.transaction import Tx
 from silo_server.events import announce
@@ -45,6 +47,17 @@ def _of(holder: Item | Document) -> ColumnElement[bool]:
     return column == holder.id
 
 
+def takes_models(of: Item | Document) -> bool:
+    """Report whether the files of an item or a document are models, and not those of an attachment."""
+    return isinstance(of, Item) or of.kind == MODEL
+
+
+def _with_file(of: Item | Document) -> ColumnElement[bool]:
+    """Return the condition of the revisions that show what ``of`` is: models, or those of an attachment."""
+    there = _of(of) & revisions.c.file_checksum.is_not(None)
+    return there & (revisions.c.kind == MODEL) if takes_models(of) else there
+
+
 def add_revision(
     tx: Tx,
     of: Item | Document,
@@ -69,6 +82,11 @@ def add_revision(
     if properties is not None:
         check_json("properties", properties)
     if file is not None:
+        if takes_models(of) and file.kind != MODEL:
+            raise RejectedError(
+                f"the model of {of.subject} is a FreeCAD document, and the content of {file.name} is none "
+                f"({file.kind.replace('_', ' ')}); send it as an attachment of an item"
+            )
         _check_base(tx, of, origin.base_revision, file.checksum)
     last = tx.conn.scalar(select(func.max(revisions.c.revision_number)).where(_of(of)))
     number = (last or 0) + 1
@@ -94,6 +112,7 @@ def add_revision(
             base_revision=origin.base_revision,
             file_path=origin.path,
             links=None if origin.links is None else dumps([dict(link) for link in origin.links]),
+            kind=None if file is None else document.kind if document else MODEL,
         )
     )
     if document is not None:
@@ -106,7 +125,8 @@ def add_revision(
             changed["thumbnail_key"] = file.thumbnail_key
         _keep(tx, item, snapshot, source, changed)
     revision = get_revision(tx, of, number)
-    announce.revision_created(tx, of, revision)
+    if takes_models(of):
+        announce.revision_created(tx, of, revision)
     return revision
 
 
@@ -154,7 +174,7 @@ def check_document(tx: Tx, item: Item, base: int | None, checksum: str | None) -
     """Raise :class:`NewerRevisionError` if a BOM is that of an older file and would undo the newest one's,
     :class:`MissingRevisionError` if its file is not here (:mod:`silo.bom.compare.base_revision`)."""
     same = select(func.max(revisions.c.revision_number)).where(
-        revisions.c.item_id == item.id, revisions.c.file_checksum == checksum
+        _with_file(item), revisions.c.file_checksum == checksum
     )
     made_from = base_revision_of(base, checksum, tx.conn.scalar(same) if checksum else None)
     _check_base(tx, item, made_from, checksum)
@@ -222,18 +242,13 @@ def files_until(tx: Tx, item: Item, until: str, limit: int = 1) -> list[int]:
     except NotFoundError:
         return []
     row = revisions.c
-    where = select(row.revision_number).where(
-        _of(of), row.file_checksum.is_not(None), row.created_at <= until
-    )
+    where = select(row.revision_number).where(_with_file(of), row.created_at <= until)
     return list(tx.conn.scalars(where.order_by(row.revision_number.desc()).limit(limit)))
 
 
 def _newest_file(tx: Tx, of: Item | Document) -> Revision | None:
     row = tx.conn.execute(
-        select(revisions)
-        .where(_of(of), revisions.c.file_checksum.is_not(None))
-        .order_by(revisions.c.revision_number.desc())
-        .limit(1)
+        select(revisions).where(_with_file(of)).order_by(revisions.c.revision_number.desc()).limit(1)
     ).one_or_none()
     return None if row is None else _to_revision(row)
 
@@ -244,6 +259,15 @@ def _to_revision(row: Row[Any]) -> Revision:
 
 
 def revision_to_wire(of: Item | Document, revision: Revision, *, links: bool = False) -> dict[str, Any]:
-    """Return a revision as the API sends it; its links only if wanted, as there may be many."""
+    """Return a revision as the API sends it; its links only if wanted, as there may be many.
+
+    An older revision of an item that holds an attachment is sent without the file: a client takes the file
+    of an item for its model. The attachment has that file too.
+    """
     number = of.part_number if isinstance(of, Item) else ""
-    return {"part_number": number, **to_wire(revision, *(() if links else ("links",)))}
+    wire = {"part_number": number, **to_wire(revision, *(() if links else ("links",)))}
+    if takes_models(of) and not revision.is_model:
+        wire |= dict.fromkeys(("file_name", "file_checksum", "file_size"))
+    if not takes_models(of) and isinstance(of, Document):
+        wire["document"] = of.uuid
+    return wire

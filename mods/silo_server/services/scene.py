@@ -24,6 +24,7 @@ from sqlalchemy import insert, select, update
 from silo.api import wire
 from silo.bom.errors import NotFoundError, RejectedError
 from silo.bom.text import character_problem
+from silo.file_kind import MODEL
 from silo_server.db.rows import one_of
 from silo_server.db.tables import document_items, documents, models, revisions
 from silo_server.db.tables import items as item_rows
@@ -50,6 +51,7 @@ def missing(tx: Tx, checksums: Collection[str]) -> list[str]:
         models.c.geometry.is_not(None), models.c.structure.is_not(None)
     )
     query = select(revisions.c.file_checksum).where(one_of(tx, revisions.c.file_checksum, checksums))
+    query = query.where(revisions.c.kind == MODEL)
     return list(tx.conn.scalars(query.where(revisions.c.file_checksum.not_in(where)).distinct()))
 
 
@@ -304,8 +306,8 @@ def scene(tx: Tx, store: FileStore, item: Item, number: int | None) -> dict[str,
     Raises NotFoundError if the item has no such file, TooLargeError.
     """
     revision = newest_file(tx, item) if number is None else get_revision(tx, with_file(tx, item), number)
-    if revision.file_checksum is None:
-        raise NotFoundError(f"revision {revision.revision_number} of {item.subject} has no file")
+    if revision.file_checksum is None or not revision.is_model:
+        raise NotFoundError(f"revision {revision.revision_number} of {item.subject} has no model")
     files = _files(tx, store, revision.file_checksum, as_recorded=number is not None)
     joined = Joined(files)
     top = files[revision.file_checksum]

@@ -22,6 +22,7 @@ from silo.api.wire import FactSource, ItemTexts
 from silo.bom.errors import NewerRevisionError, RejectedError, SiloError
 from silo.bom.numbers import read_number
 from silo.bom.quantities import plain
+from silo.file_kind import MODEL
 from silo_server.db.transaction import Tx
 from silo_server.routes.call import Call
 from silo_server.routes.items import numbered, store_file
@@ -33,6 +34,7 @@ from silo_server.services.releases import draft_of
 from silo_server.services.revisions import RevisionOrigin
 from silo_server.values import Document, Item, Revision
 from silo_server.web.accounts import Writer
+from silo_server.web.attachments import kind_words
 from silo_server.web.forms import Form, back, compared, problems_of, same_text, text, whole
 from silo_server.web.render import N_, _, isolate, page, segment
 from silo_server.web.unsent_form import UnsentForm
@@ -166,6 +168,14 @@ def upload(call: Writer, part_number: str, form: Form) -> Response:
         raise RejectedError(_("no file was chosen, so nothing was uploaded"))
 
     def answer(tx: Tx, of: Item | Document, revision: Revision) -> Response:
+        if revision.kind not in (None, MODEL):
+            attached = _(
+                "%(file)s lies beside the model: %(kind)s, revision %(number)s.",
+                file=isolate(revision.file_name or ""),
+                kind=kind_words()[revision.kind],
+                number=revision.revision_number,
+            )
+            return back(f"{path}#attachments", attached)
         notice = _(
             "%(file)s is revision %(number)s.",
             file=isolate(revision.file_name or ""),
@@ -176,9 +186,12 @@ def upload(call: Writer, part_number: str, form: Form) -> Response:
         return back(f"{path}#revisions", notice)
 
     comment, key = text(form, "comment", LONGEST), text(form, "key", 128) or None
+    kind = text(form, "kind", 20)
     origin = RevisionOrigin(whole(form, "base_revision"))
     try:
-        return store_file(call, numbered(part_number), file, comment, answer, key=key, origin=origin)
+        return store_file(
+            call, numbered(part_number), file, comment, answer, key=key, origin=origin, kind=kind
+        )
     except NewerRevisionError as error:
         # Who sends the form of that page has read of the newer revision: the file goes on top of it.
         newest = str(error.revision["revision_number"])

@@ -28,6 +28,7 @@ from silo_server.fields import names_of
 from silo_server.routes.items import told_of
 from silo_server.schema import ITEM_TYPES, find_schema
 from silo_server.services import documents, revisions
+from silo_server.services.attachments import attachments_of
 from silo_server.services.bom.last_sync import in_sentences, last_sync
 from silo_server.services.bom.lines import lines_of_many
 from silo_server.services.documents import documents_holding, get_document
@@ -46,6 +47,7 @@ from silo_server.services.product.summary_read import at_once, marks_of, standin
 from silo_server.services.product.where_used import use_counts, where_used
 from silo_server.values import Item, Line
 from silo_server.web.accounts import Reader
+from silo_server.web.attachments import kind_words
 from silo_server.web.item_edit_page import shown_properties
 from silo_server.web.releases_page import state_of
 from silo_server.web.render import PAGE_ROWS, Address, Page, _, arranged, page, page_of, segment
@@ -400,6 +402,7 @@ def item_page(
         looked, now = last_look(tx, call.actor.own_id, item), tx.stamp
         release, following = state_of(tx, item), is_followed(tx, call.actor.own_id, item)
         beside = _beside(tx, look.beside)
+        attached = attachments_of(tx, [item.id]).get(item.id, [])
     call.server.db.looks[call.actor.own_id, item.id] = now
     return page(
         call,
@@ -415,6 +418,8 @@ def item_page(
         revisions=history,
         revision_count=revision_count,
         files=files,
+        attachments=attached,
+        kinds=kind_words(),
         used=used,
         uses=uses,
         used_from=used_from,
@@ -435,6 +440,7 @@ def _beside(tx: Tx, part_number: str) -> dict[str, Any] | None:
     summary = at_once(tx, {item.id}).get(item.id)
     files = documents.shown(tx, documents_holding(tx, item))
     values = {"item": item, "properties": shown_properties(item), "summary": summary, "files": files}
+    values |= {"attachments": attachments_of(tx, [item.id]).get(item.id, [])}
     return values | {"used": used, "uses": uses, "release": state_of(tx, item)}
 
 

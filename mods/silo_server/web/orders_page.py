@@ -25,6 +25,7 @@ from silo_server.services.items import ItemChange, get_item
 from silo_server.services.orders import OrderRequest, OrderRow
 from silo_server.services.suppliers import COLUMNS, EXAMPLES, MOST_PARTS, decimal_text, typed_text
 from silo_server.web.accounts import Administrator, Reader, Writer
+from silo_server.web.attachments import kind_words
 from silo_server.web.forms import Form, amount, back, back_to, problems_of, text, texts, whole
 from silo_server.web.import_page import Problem, Upload, carried, checked, layout_of, reading
 from silo_server.web.render import N_, PAGE_ROWS, Address, _, isolate, page, page_of, segment
@@ -137,6 +138,7 @@ def order_page(
         call,
         "order.html",
         item=product,
+        kinds=kind_words(),
         asked=asked,
         spares=decimal_text(asked.spares),
         found=order_list,

@@ -25,6 +25,7 @@ from silo_server.routes.call import SAFE_METHODS, find_actor
 from silo_server.web import (
     accounts,
     activity_page,
+    attachments,
     import_page,
     item_edit_page,
     item_page,
@@ -40,6 +41,7 @@ ROUTERS = (
     accounts.router,
     item_edit_page.router,  # before item_page: /items/new is no part number
     item_page.router,
+    attachments.router,
     merge_page.router,
     releases_page.router,
     orders_page.router,

@@ -20,7 +20,7 @@ from silo_server.services import releases
 from silo_server.services.access.users import get_user
 from silo_server.services.items import get_item
 from silo_server.services.product.flat import flatten
-from silo_server.services.product.frozen import ProductContent, frozen_product
+from silo_server.services.product.frozen import ProductContent, frozen_files, frozen_product
 from silo_server.services.product.graph import MAX_DEPTH
 from silo_server.services.product.summary import in_unit_of
 from silo_server.services.product.summary_read import summary_of
@@ -28,6 +28,7 @@ from silo_server.services.product.tree import expand
 from silo_server.services.releases import Release
 from silo_server.values import Item
 from silo_server.web.accounts import Reader, Writer
+from silo_server.web.attachments import kind_words
 from silo_server.web.forms import Form, back, text
 from silo_server.web.render import N_, Address, _, page, page_of, segment
 
@@ -140,7 +141,7 @@ def release_page(
         item = get_item(tx, part_number, include_archived=True)
         release = releases.get_release(tx, item, label)
         product = frozen_product(tx, item, release)
-        record = releases.read_record(tx, release.record)
+        models, beside = frozen_files(tx, release.record)
         approvals = releases.approvals_of(tx, release)
         numbered = [other for other in releases.list_releases(tx, item) if other.status in releases.NUMBERED]
     before = next((other for other in numbered if other.frozen_at < release.frozen_at), None)
@@ -158,7 +159,9 @@ def release_page(
         at=at,
         flat=view == "flat",
         worth=product.worths[product.graph.root.id],
-        files=sorted(record["files"], key=lambda other: other["file_path"] or other["file_name"]),
+        files=sorted(models, key=lambda other: other["file_path"] or other["file_name"]),
+        attachments=beside,
+        kinds=kind_words(),
         cut=len(rows) == MOST_ROWS,
     )
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any, Self, TypeVar
 from urllib.parse import quote, urlsplit
 
+from model_file import model_file
 from urllib3.util import wait_for_read
 
 TIMEOUT = 300  # [s], reached only if the test fails; a busy machine may need minutes
@@ -158,7 +159,9 @@ class Api:
         """Change a line by hand; the line."""
         return self.good("PUT", bom(parent, child), fields)
 
-    def upload(self, item: str, content: bytes = b"x", name: str = "x.FCStd", **parts: str) -> Any:
+    def upload(
+        self, item: str, content: bytes = model_file(b"x"), name: str = "x.FCStd", **parts: str
+    ) -> Any:
         """Upload a file; its revision."""
         body, headers = form_body({"file": (name, content), **parts})
         return self.good("POST", f"/api/items/{quote(item)}/file", body=body, headers=headers)

@@ -41,7 +41,11 @@ def add_pull(parser: argparse.ArgumentParser) -> None:
         "a released revision, such as B, with all files as they were frozen; else the newest of all",
     )
     add_options(
-        parser, {"--replace": "replace files with edits that are not in Silo; a copy of each is kept"}
+        parser,
+        {
+            "--attachments": "also the drawings, STEP files and other attachments, beside the models",
+            "--replace": "replace files with edits that are not in Silo; a copy of each is kept",
+        },
     )
 
 
@@ -63,7 +67,8 @@ def run_pull(args: argparse.Namespace) -> int:
         )
         number = named_item(client, args.part_number).part_number
         progress = lambda name, count: set_step(f"fetching {name}, {counted(count, 'file')} so far")  # noqa: E731
-        with fetched(client, number, args.revision, progress=progress) as tree:
+        wanted = {"progress": progress, "attachments": args.attachments}
+        with fetched(client, number, args.revision, **wanted) as tree:
             into.mkdir(parents=True, exist_ok=True)
             pulled = place(tree, into, rules)
     if args.json:
@@ -105,4 +110,6 @@ def _show_pulled(pulled: Pulled, into: Path) -> None:
     for lost in pulled.lost:
         line = f"{lost.position}: {lost.path} was not fetched: {lost.reason}"
         out.print(Text("✗ ", "bold red").append(plain(spoken(line)), ""))
+    for remark in pulled.remarks:
+        out.print(Text("! ", "yellow").append(plain(spoken(remark)), ""))
     out.print(Text(plain(spoken(f"Open {pulled.top}")), "bold"))

@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 from sqlalchemy import select
 
 from silo.bom.quantities import plain
+from silo.file_kind import MODEL
 from silo_server.db.rows import one_of
-from silo_server.db.tables import bom_changes, revisions
+from silo_server.db.tables import bom_changes, documents, revisions
 from silo_server.db.transaction import Tx
 from silo_server.services.bom.differences import Difference, compare
 from silo_server.services.bom.history import PastLine, change_at, state_at
@@ -159,13 +160,40 @@ def _items_happened(tx: Tx, ids: Collection[int], since: str, until: str) -> Ite
         if differences := data_differs(*sides):
             what = ("data", "", item.part_number, item.name, *differences)
             yield PastChange(*what, last.created_at, last.created_by)
-        files = [record for record in rows if record.file_checksum]
+        files = [record for record in rows if record.kind == MODEL]
         older = [file for file in files if file.created_at <= since]
         if files and (not older or older[-1].file_checksum != files[-1].file_checksum):
             newest = files[-1]
             before, after = (_file(versions) for versions in (older, files))
             what = ("file", "", item.part_number, item.name, before, after)
             yield PastChange(*what, newest.created_at, newest.created_by)
+    yield from _attachments_happened(tx, ids, since, until)
+
+
+def _attachments_happened(tx: Tx, ids: Collection[int], since: str, until: str) -> Iterator[PastChange]:
+    doc, row = documents.c, revisions.c
+    query = (
+        select(doc.attached_to, doc.removed_at, revisions)
+        .join(revisions, row.document_id == doc.id)
+        .where(one_of(tx, doc.attached_to, ids), row.created_at <= until)
+        .order_by(doc.id, row.revision_number)
+    )
+    attachments: dict[int, list[Any]] = {}
+    for record in tx.conn.execute(query):
+        if record.removed_at is None or record.removed_at > since:
+            attachments.setdefault(record.document_id, []).append(record)
+    named = by_ids(tx, {rows[0].attached_to for rows in attachments.values()})
+    for rows in attachments.values():
+        older = [record for record in rows if record.created_at <= since]
+        removed = rows[-1].removed_at is not None and rows[-1].removed_at <= until
+        later = [] if removed else rows
+        if bool(older) == bool(later) and len(older) == len(later):
+            continue
+        item, newest = named[rows[0].attached_to], rows[-1]
+        what = ("file", "", item.part_number, item.name, _file(older), _file(later))
+        # Who removed an attachment is in the log of events only.
+        by = (newest.removed_at, "") if removed else (newest.created_at, newest.created_by)
+        yield PastChange(*what, *by)
 
 
 def data_differs(then: Mapping[str, Any], now: Mapping[str, Any]) -> tuple[str, str] | None:

@@ -20,9 +20,11 @@ from sqlalchemy import select
 
 from silo.api.wire import ItemTexts
 from silo.bom.quantities import plain
+from silo.file_kind import KIND_WORDS, MODEL
 from silo_server.db.rows import one_of
 from silo_server.db.tables import document_items, document_links, documents, revisions
 from silo_server.db.transaction import Tx
+from silo_server.services.attachments import Attachment, attachments_of
 from silo_server.services.bom.differences import compare
 from silo_server.services.bom.history import NamedItem, PastLine
 from silo_server.services.bom.line_state import state_to_json, stored_state
@@ -64,7 +66,7 @@ def freeze(tx: Tx, item: Item) -> FrozenProduct:
     ids = graph.names().keys()
     items = by_ids(tx, ids)
     worths = summaries(tx, ids)
-    files = _files(tx, items)
+    files, beside = _files(tx, items), attachments_of(tx, ids)
     without_file = [part for part in items.values() if not files[part.id]]
     hashes: dict[int, str] = {}
     records: dict[str, str] = {}
@@ -84,22 +86,44 @@ def freeze(tx: Tx, item: Item) -> FrozenProduct:
         # A file may lie in the product without a link that leads to it, if a person uploaded it.
         files[item_id] = {**files[item_id], **{k: v for child in below for k, v in files[child].items()}}
         written = [files[item_id][document] for document in sorted(files[item_id])]
-        text = dumps(_record(items[item_id], worths[item_id], written, lines))
+        text = dumps(_record(items[item_id], worths[item_id], written, beside.get(item_id, ()), lines))
         hashes[item_id] = hashlib.sha256(text.encode()).hexdigest()
         records[hashes[item_id]] = text
     blocks = [f"{bom.part_number}: {bom.words}" for bom in worths[item.id].open.values()]
+    blocks += [f"{part.part_number}: no file" for part in without_file if _is_modelled(part)]
     blocks += [
-        f"{part.part_number}: no file"
-        for part in without_file
-        if part.item_type in ("part", "assembly") and not part.is_bought
+        f"{part.part_number}: no {KIND_WORDS[kind]}"
+        for part in filter(_is_modelled, items.values())
+        for kind in tx.settings.release_kinds
+        if kind not in {attachment.kind for attachment in beside.get(part.id, ())}
     ]
     return FrozenProduct(hashes[item.id], records, sorted(blocks), tx.stamp)
 
 
+def _is_modelled(item: Item) -> bool:
+    """Report whether the site makes an item itself, and so needs its model and its drawings."""
+    return item.item_type in ("part", "assembly") and not item.is_bought
+
+
 def _record(
-    item: Item, summary: Summary, files: Sequence[Mapping[str, Any]], lines: Sequence[Mapping[str, Any]]
+    item: Item,
+    summary: Summary,
+    files: Sequence[Mapping[str, Any]],
+    beside: Sequence[Attachment],
+    lines: Sequence[Mapping[str, Any]],
 ) -> dict[str, Any]:
     worth = summary.as_part
+    attached = [
+        {
+            "document": attachment.id,
+            "revision": attachment.revision_number,
+            "kind": attachment.kind,
+            "file_name": attachment.file_name,
+            "sha256": attachment.file_checksum,
+            "size": attachment.file_size,
+        }
+        for attachment in beside
+    ]
     return {
         "item": item.uuid,
         "part_number": item.part_number,
@@ -118,8 +142,41 @@ def _record(
         "costs": {currency: str(cost) for currency, cost in sorted(worth.costs.items())},
         "cost_whole": worth.cost_whole,
         "files": files,
+        **({"attachments": attached} if attached else {}),
         "lines": lines,
     }
+
+
+def frozen_files(tx: Tx, record: str) -> tuple[list[Mapping[str, Any]], list[Mapping[str, Any]]]:
+    """Read the models of a frozen product, and the attachments of all its items, each with its part number.
+
+    Before files had kinds, the newest file of an item was frozen as its model, whatever it was: the kind of
+    that revision decides. Raises TooLargeError.
+    """
+    records = read_records(tx, record)
+    numbers = {made["item"]: made["part_number"] for made in records.values()}
+    files: Sequence[Mapping[str, Any]] = records[record]["files"]
+    query = (
+        select(documents.c.uuid, revisions.c.revision_number, revisions.c.kind)
+        .join(revisions, revisions.c.document_id == documents.c.id)
+        .where(one_of(tx, documents.c.uuid, {file["document"] for file in files}))
+        .where(revisions.c.kind != MODEL)
+    )
+    others = {(uuid, number): kind for uuid, number, kind in tx.conn.execute(query)}
+    models: list[Mapping[str, Any]] = []
+    beside: list[Mapping[str, Any]] = []
+    for file in files:
+        kind = others.get((file["document"], file["revision"]))
+        if kind is None:
+            models.append(file)
+        else:
+            beside.append({**file, "kind": kind, "part_number": numbers.get(file["document"], "")})
+    beside += [
+        {**attached, "part_number": made["part_number"]}
+        for made in records.values()
+        for attached in made.get("attachments", ())
+    ]
+    return models, sorted(beside, key=lambda each: (each["part_number"], each["kind"], each["file_name"]))
 
 
 def _files(tx: Tx, items: Mapping[int, Item]) -> dict[int, dict[str, dict[str, Any]]]:
@@ -313,5 +370,6 @@ def _own_files(side: Records) -> dict[str, list[Mapping[str, Any]]]:
             if line["child"]
             for file in side[line["item"]]["files"]
         }
-        files[uuid] = [file for file in made["files"] if file["document"] not in below]
+        own = [file for file in made["files"] if file["document"] not in below]
+        files[uuid] = [*own, *made.get("attachments", ())]
     return files
