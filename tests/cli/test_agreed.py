@@ -137,8 +137,6 @@ def test_which_options_need_another() -> None:
             for command in weighing
             for option in ("--dry-run", "--item", "--server", "--token")
         ),
-        ("inertia", "--urdf", "--in-place"),
-        ("inertia", "--urdf", "--urdf-out"),
         ("mass", "--push", "--index"),
         ("bom", "--resolve", "--server"),
         ("bom", "--resolve", "--token"),

@@ -17,6 +17,7 @@ from silo.inertia.checks import (
     check_far_frames,
     check_frames,
     check_links_of_urdf,
+    check_other_links,
     check_rows,
     check_tensors,
 )
@@ -52,6 +53,7 @@ def calculate(assembly: Assembly, table: BomTable | None, task: Task | None = No
     check_far_frames(report, claims, task)
     if urdf is not None:
         check_links_of_urdf(report, urdf)
+        check_other_links(report, urdf)
     return report
 
 

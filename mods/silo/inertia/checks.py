@@ -37,6 +37,18 @@ def check_links_of_urdf(report: InertiaReport, urdf: Urdf) -> None:
             report.add_warning(name, "", words, MassCode.LINK_LOOSE)
 
 
+def check_other_links(report: InertiaReport, urdf: Urdf) -> None:
+    """Warn of links that are not ours, and that no simulator loads: the whole robot fails with them."""
+    sentences = [
+        f"The link {name} is not ours, and {words}."
+        for name, words in urdf.impossible.items()
+        if name not in report.links or report.links[name].props.mass <= 0
+    ]
+    if sentences:
+        words = f"{' '.join(sentences)} They stay as the URDF has them, and simulators refuse the whole file"
+        report.add_warning("", "", words, MassCode.URDF_IMPOSSIBLE)
+
+
 def check_frames(report: InertiaReport, claims: Claims, task: Task) -> None:
     """Warn if a link map's frame or --frame wins: a URDF would get numbers of another frame."""
     for name in claims.members:

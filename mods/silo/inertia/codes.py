@@ -46,6 +46,7 @@ class MassCode(StrEnum):
     LINK_NOT_IN_URDF = "link_not_in_urdf"  # a link of ours that the URDF does not have: its mass goes nowhere
     LINK_LOOSE = "link_loose"  # no joints lead from it to the URDF's root: its frame is not known
     ZERO_MASS_LINK = "zero_mass_link"
+    URDF_IMPOSSIBLE = "urdf_impossible"  # a link of the URDF that is not ours has an inertia no body can have
     BAD_TENSOR = "bad_tensor"
 
 

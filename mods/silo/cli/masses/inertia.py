@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from silo.bom.errors import InputError, listed
@@ -23,7 +24,7 @@ from silo.cli.masses.options import (
 )
 from silo.cli.masses.push import push_report
 from silo.cli.masses.report import show_report, verdict
-from silo.cli.options import add_each, add_options, only_with
+from silo.cli.options import add_each, add_options
 from silo.cli.outputs import add_outputs
 from silo.output_files import beginning
 
@@ -48,7 +49,7 @@ def add_inertia(parser: argparse.ArgumentParser) -> None:
         "--urdf-out",
         "--in-place",
         metavar="ASSEMBLY",
-        help="a STEP, mesh or FCStd file",
+        help="a STEP, mesh or FCStd file, or a URDF with its meshes",
     )
     group = parser.add_argument_group("links")
     add_options(
@@ -95,13 +96,18 @@ def add_inertia(parser: argparse.ArgumentParser) -> None:
     add_geometry_options(parser)
     add_result_options(parser)
     add_push_options(parser)
-    only_with(parser, "--urdf", "--urdf-out", "--in-place")
 
 
 def run_inertia(args: argparse.Namespace) -> int:
     """Calculate and show; returns 1 for warnings with --strict, or items that a push did not find."""
     need_inertia_extra()
     check_options(args, asks_server=args.push and not args.dry_run)
+    if not args.urdf and is_urdf(args.assembly):
+        args.urdf = args.assembly
+    if (args.urdf_out or args.in_place) and not args.urdf:
+        raise InputError(
+            "--urdf-out and --in-place do nothing without --urdf, or a URDF as ASSEMBLY"
+        )
     if args.urdf_out and args.in_place:
         raise InputError("--urdf-out and --in-place name two places for one URDF; give one of them")
     if args.snippet and args.json:
@@ -142,6 +148,13 @@ def _task(args: argparse.Namespace) -> Task:
         args.loose,
         weights=named_values(args.mass, "--mass", "NAME=MASS, for example arm=1.25kg"),
     )
+
+
+def is_urdf(path: str) -> bool:
+    """Return True if the geometry is a URDF, which then is also the file to fill."""
+    from silo.inertia.geometry.formats import Format, detect
+
+    return Path(path).is_file() and detect(Path(path)) is Format.URDF
 
 
 def _write_urdf(args: argparse.Namespace, report: InertiaReport, urdf: Urdf) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
 from enum import StrEnum
 from pathlib import Path
@@ -21,11 +22,18 @@ class Format(StrEnum):
     PLY = "ply"
     GLB = "glb"
     THREEMF = "3mf"
+    DAE = "dae"
+    URDF = "urdf"
 
     @property
     def is_mesh(self) -> bool:
         """Return True if the format has triangles and needs no geometry kernel."""
-        return self not in (Format.STEP, Format.BREP, Format.FREECAD)
+        return self not in (Format.STEP, Format.BREP, Format.FREECAD, Format.URDF)
+
+    @property
+    def needs_kernel(self) -> bool:
+        """Return True if the geometry kernel reads it."""
+        return self in (Format.STEP, Format.BREP, Format.FREECAD)
 
 
 _SUFFIXES = {f".{kind}": kind for kind in Format} | {
@@ -41,6 +49,9 @@ _OTHERS = {
     b"PK": "is a zip archive, and no FreeCAD document or 3MF file; unpack it first",
 }
 """What is refused with a word of its own, by its first bytes."""
+
+_ROOT = re.compile(rb"(?:<\?[^>]*\?>|<!--.*?-->|\s)*<(\w+)", re.DOTALL)
+_XML = {b"COLLADA": Format.DAE, b"robot": Format.URDF}
 
 _HEAD_BYTES = 1024
 
@@ -105,7 +116,8 @@ def _by_content(path: Path, head: bytes) -> Format | None:
         return Format.STL
     if head.startswith(b"PK"):
         return _zip_kind(path)
-    return None
+    root = _ROOT.match(text)
+    return _XML.get(root[1]) if root is not None else None
 
 
 def _zip_kind(path: Path) -> Format | None:

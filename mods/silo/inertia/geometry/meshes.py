@@ -57,7 +57,7 @@ class MeshScene:
 def read_mesh(path: Path, kind: Format, options: ReadOptions, report: Report) -> GeometryReading:
     """Read the assembly of a mesh file: one instance, or those of its scene. Raises DocumentError."""
     report("reading", 0, 0)
-    scene = _scene(path, kind)
+    scene = mesh_scene(path, kind)
     unit, unit_name, problems = _unit(scene, options)
     with np.errstate(over="ignore", invalid="ignore"):  # what comes of it is checked
         unfolded = unfold(scene.nodes, scene.roots, options.max_instances)
@@ -71,7 +71,7 @@ def read_mesh(path: Path, kind: Format, options: ReadOptions, report: Report) ->
         mesh = scene.meshes[key]
         notes = scene.said.get(key, ())
         name = scene.nodes[key].name
-        prototypes[key] = _prototype(key, name, Mesh(mesh.vertices * unit, mesh.faces), notes)
+        prototypes[key] = mesh_prototype(key, name, Mesh(mesh.vertices * unit, mesh.faces), notes)
     problems += [*scene.said.get("", ())]
     problems += implausible_size(prototypes, unit_name)
     return GeometryReading(
@@ -92,7 +92,8 @@ def _check(path: Path, what: str, numbers: Floats) -> None:
         raise DocumentError(str(path), f"{reason}; repair the file or export it again")
 
 
-def _scene(path: Path, kind: Format) -> MeshScene:
+def mesh_scene(path: Path, kind: Format) -> MeshScene:
+    """Read the meshes of a file and their places. Raises DocumentError."""
     if kind is Format.THREEMF:
         return read_3mf(path)
     try:
@@ -137,6 +138,9 @@ def _from_trimesh(path: Path, kind: Format, loaded: Any) -> MeshScene:
         raise DocumentError(str(path), "holds no triangles")
     roots = _tree(loaded.graph, nodes)
     glb = kind is Format.GLB
+    if kind is Format.DAE:
+        unit = _dae_unit(path)
+        return MeshScene(meshes, nodes, roots, f"{unit:g} m", unit)
     notes: list[Note] = []
     if kind in (Format.OBJ, Format.GLB):
         used = [loaded.graph.transforms.node_data[n].get("geometry") for n in loaded.graph.nodes_geometry]
@@ -147,6 +151,18 @@ def _from_trimesh(path: Path, kind: Format, loaded: Any) -> MeshScene:
         )
         notes = _unread(path.read_bytes(), glb, read)
     return MeshScene(meshes, nodes, roots, "m" if glb else "", 1.0 if glb else None, {"": notes})
+
+
+_DAE_UNIT = re.compile(rb"<unit\b[^>]*\bmeter\s*=\s*[\"']([0-9.eE+-]+)[\"']")
+
+
+def _dae_unit(path: Path) -> float:
+    """Return the unit [m] that a COLLADA file states; its default is one metre."""
+    found = _DAE_UNIT.search(path.read_bytes())
+    try:
+        return float(found[1]) if found is not None and float(found[1]) > 0 else 1.0
+    except ValueError:
+        return 1.0
 
 
 _POLYGON = re.compile(rb"^[ \t]*(f[ \t](?:[^\n]*\\\r?\n)*[^\n]*|surf[ \t])", re.MULTILINE)
@@ -227,7 +243,7 @@ def _unit(scene: MeshScene, options: ReadOptions) -> tuple[float, str, list[Note
     return MESH_UNITS["mm"], "mm", [problem]
 
 
-def _prototype(key: str, name: str, mesh: Mesh, notes: Sequence[Note]) -> Prototype:
+def mesh_prototype(key: str, name: str, mesh: Mesh, notes: Sequence[Note]) -> Prototype:
     problems = list(notes)
     solid = enclosed(mesh, problems)
     solids = (solid,) if solid.volume_m3 else ()

@@ -39,7 +39,7 @@ def read(path: str | Path, *, options: ReadOptions | None = None) -> Assembly:
     path = Path(path)
     kind = detect(path)
     if not options.isolate:
-        if not kind.is_mesh:
+        if kind.needs_kernel:
             from silo.inertia.geometry import kernel as occt
 
             occt.quiet()
@@ -100,6 +100,10 @@ def _reading(path: Path, options: ReadOptions, report: Report, helpers: Helpers)
         from silo.inertia.geometry.step import read_step
 
         return read_step(path, options, report, helpers, text)
+    if kind is Format.URDF:
+        from silo.inertia.geometry.robot import read_robot
+
+        return read_robot(path, options, report)
     if kind.is_mesh:
         from silo.inertia.geometry.meshes import read_mesh
 
