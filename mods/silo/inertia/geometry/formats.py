@@ -50,7 +50,7 @@ _OTHERS = {
 }
 """What is refused with a word of its own, by its first bytes."""
 
-_ROOT = re.compile(rb"(?:<\?[^>]*\?>|<!--.*?-->|\s)*<(\w+)", re.DOTALL)
+_START = re.compile(rb"<(\w+)")
 _XML = {b"COLLADA": Format.DAE, b"robot": Format.URDF}
 
 _HEAD_BYTES = 1024
@@ -116,7 +116,10 @@ def _by_content(path: Path, head: bytes) -> Format | None:
         return Format.STL
     if head.startswith(b"PK"):
         return _zip_kind(path)
-    root = _ROOT.match(text)
+    root = _START.search(text) if text.startswith(b"<") else None
+    while root is not None and b"<!--" in text[: root.start()]:  # a comment may hold what looks like a tag
+        _, _, text = text.partition(b"-->")
+        root = _START.search(text)
     return _XML.get(root[1]) if root is not None else None
 
 
