@@ -45,6 +45,8 @@ class Actor:
         what this caller may do: the user's role, or less if the token's scope is narrower.
     scope, expires_at
         those of the token (``auth_source`` token); ``expires_at`` None = until it is revoked.
+    credential_id
+        of the token or session, as the tree of credentials has it; None for the server itself.
     by_link
         a session that a login link began: the user may set a password without naming the old one.
     """
@@ -60,6 +62,7 @@ class Actor:
     scope: Scope = Scope.ADMIN
     expires_at: str | None = None
     by_link: bool = False
+    credential_id: int | None = None
 
     @property
     def by_token(self) -> bool:

@@ -35,6 +35,7 @@ PUBLIC = {
 OF_VIEWERS = {
     *("POST /login/program", "POST /logout", "POST /mine/follow", "POST /mine/seen", "POST /account/tokens"),
     *("POST /account/tokens/{token_id}/revoke", "POST /account/password"),
+    "POST /account/logout-everywhere",
     # These two need the right to approve, whatever the role.
     "POST /items/{part_number}/releases/{label}/approval",
     "POST /items/{part_number}/releases/{label}/end",

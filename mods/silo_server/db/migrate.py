@@ -799,6 +799,54 @@ def _attach_all(
         bind.execute(revisions.insert(), copies)
 
 
+def _credentials(op: Operations) -> None:
+    """Write down which credential made which; those that there are have no parent, and are known as such."""
+    op.create_table(
+        "credentials",
+        primary("id", Id),
+        Column("parent_id", Id, ForeignKey("credentials.id")),
+        needed("kind", String(16)),
+        needed("user_id", Id, ForeignKey("users.id")),
+        needed("name", Text),
+        needed("known", Boolean),
+        needed("created_at", Stamp),
+        Index(None, "parent_id"),
+        Index(None, "user_id"),
+        sqlite_autoincrement=True,
+    )
+    connection = op.get_bind()
+    rows = MetaData()
+    rows.reflect(connection, only=["credentials", "api_tokens", "sessions", "login_links"])
+    made = rows.tables["credentials"]
+    kinds = {"api_tokens": ("id", "token"), "sessions": ("id_hash", "session")}
+    kinds["login_links"] = ("token_hash", "link")
+    for name, (key, kind) in kinds.items():
+        old = rows.tables[name]
+        owned: list[tuple[object, int]] = []
+        for row in connection.execute(select(old)).mappings().all():
+            values = {
+                "kind": kind,
+                "user_id": row["user_id"],
+                "name": row.get("name", ""),
+                "known": False,
+                "created_at": row.get("created_at", row.get("expires_at")),
+            }
+            noted = made.insert().values(values).returning(made.c.id)
+            owned.append((row[key], connection.execute(noted).scalar_one()))
+        options = {"sqlite_autoincrement": True} if name == "api_tokens" else {}
+        with op.batch_alter_table(name, table_kwargs=options) as table:
+            table.add_column(Column("credential_id", Id))
+        fresh = Table(name, MetaData(), autoload_with=connection)
+        for value, credential in owned:
+            connection.execute(fresh.update().where(fresh.c[key] == value).values(credential_id=credential))
+        with op.batch_alter_table(name, table_kwargs=options) as table:
+            table.alter_column("credential_id", existing_type=Id, nullable=False)
+            table.create_foreign_key(
+                f"fk_{name}_credential_id_credentials", "credentials", ["credential_id"], ["id"]
+            )
+            table.create_unique_constraint(f"uq_{name}_credential_id", ["credential_id"])
+
+
 STEPS: dict[str, Callable[[Operations], None]] = {
     "0007": _first_schema,
     "0008": _answers,
@@ -814,4 +862,5 @@ STEPS: dict[str, Callable[[Operations], None]] = {
     "0019": _documents_that_became_others,
     "0020": _units,
     "0021": _attachments,
+    "0022": _credentials,
 }

@@ -438,6 +438,23 @@ users = Table(
     sqlite_autoincrement=True,
 )
 
+# What lets somebody in: a token, a session or a login link. ``parent_id`` made it. ``known`` is false for
+# those of versions that did not write a parent down.
+credentials = Table(
+    "credentials",
+    metadata,
+    primary("id", Id),
+    Column("parent_id", Id, ForeignKey("credentials.id")),
+    needed("kind", String(16)),
+    needed("user_id", Id, ForeignKey("users.id")),
+    needed("name", Text),
+    needed("known", Boolean),
+    needed("created_at", Stamp),
+    Index(None, "parent_id"),
+    Index(None, "user_id"),
+    sqlite_autoincrement=True,
+)
+
 api_tokens = Table(
     "api_tokens",
     metadata,
@@ -451,6 +468,7 @@ api_tokens = Table(
     Column("expires_at", Stamp),
     Column("last_used_at", Stamp),
     Column("revoked_at", Stamp),
+    needed("credential_id", Id, ForeignKey("credentials.id"), unique=True),
     Index(None, "user_id"),
     sqlite_autoincrement=True,
 )
@@ -464,6 +482,7 @@ sessions = Table(
     needed("by_link", Boolean, server_default=false()),
     needed("created_at", Stamp),
     needed("expires_at", Stamp),
+    needed("credential_id", Id, ForeignKey("credentials.id"), unique=True),
     Index(None, "user_id"),
 )
 
@@ -473,6 +492,7 @@ login_links = Table(
     primary("token_hash", String(64)),
     needed("user_id", Id, ForeignKey("users.id")),
     needed("expires_at", Stamp),
+    needed("credential_id", Id, ForeignKey("credentials.id"), unique=True),
 )
 
 login_attempts = Table(

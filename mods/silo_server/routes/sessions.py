@@ -59,6 +59,12 @@ def log_out(call: Viewer) -> Response:
     return response
 
 
+@router.post("/auth/logout-everywhere", responses=WRITE_ERRORS)
+def log_out_everywhere(call: Viewer) -> dict[str, int]:
+    """End all sessions of the caller, and every token and link that was made in any of them."""
+    return {"ended": sessions.log_out_everywhere(call.server.db, call.actor)}
+
+
 @router.get("/auth/me", responses=READ_ERRORS)
 def who_am_i(call: Viewer) -> dict[str, Any]:
     """Return the user of this token or session."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Path
+from fastapi import APIRouter, Path, Query
 from pydantic import ConfigDict, Field, WithJsonSchema
 from starlette.responses import Response
 
@@ -17,7 +17,7 @@ from silo_server.routes.call import Call, Viewer
 from silo_server.routes.models import RequestBody, Short
 from silo_server.routes.requests import BoundedRoute
 from silo_server.services.access import tokens
-from silo_server.services.access.tokens import Token, check_may_change, create_own_token
+from silo_server.services.access.tokens import Children, Parent, Token, check_may_change, create_own_token
 
 router = APIRouter(route_class=BoundedRoute, prefix="/api", tags=["auth"])
 
@@ -60,22 +60,36 @@ def create_token(call: Viewer, body: TokenBody) -> dict[str, Any]:
 
 
 @router.delete("/auth/tokens/{token_id}", status_code=204, responses=WRITE_ERRORS)
-def revoke_token(call: Viewer, token_id: Annotated[int, Path(ge=1, le=2**62)]) -> Response:
-    """Revoke a token: one's own, or anybody's for an admin."""
-    revoke(call, token_id)
+def revoke_token(
+    call: Viewer,
+    token_id: Annotated[int, Path(ge=1, le=2**62)],
+    children: Annotated[Children | None, Query()] = None,
+) -> Response:
+    """Revoke a token: one's own, or anybody's for an admin.
+
+    ``children``: if what was made with the token, and lives on, ends as well (``end``, as after a leak) or
+    stays (``keep``). Without it a token that has such children is not revoked: the 409 lists them.
+    """
+    revoke(call, token_id, children)
     return Response(status_code=204)
 
 
-def revoke(call: Call, token_id: int) -> None:
+def revoke(call: Call, token_id: int, children: Children | None = None) -> None:
     """Revoke a token of the caller's own, or anybody's for an admin."""
     check_may_change(call.actor)
     owner = None if call.actor.role is Role.ADMIN else call.actor.own_id
     with call.write(even_when_read_only=True) as tx:
-        tokens.revoke_token(tx, token_id, owner)
+        tokens.revoke_token(tx, token_id, owner, children)
+
+
+def _parent(parent: Parent | None) -> dict[str, Any] | None:
+    """Describe what made a token: null for the server itself, ``known`` false for an older version's."""
+    return None if parent is None else to_wire(parent)
 
 
 def _token(token: Token) -> dict[str, Any]:
     return {
-        **to_wire(token, "username", "scope"),
+        **to_wire(token, "username", "scope", "parent"),
+        "parent": _parent(token.parent),
         "scopes": [scope.value for scope in Scope if token.scope.covers(scope)],
     }

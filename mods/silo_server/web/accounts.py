@@ -45,7 +45,13 @@ from silo_server.services.access.login_links import use_login_link
 from silo_server.services.access.passwords import MIN_PASSWORD
 from silo_server.services.access.sessions import NewSession, actor_by_session, set_own_password
 from silo_server.services.access.signing import signing_key
-from silo_server.services.access.tokens import create_own_token, list_tokens, secret_of_form
+from silo_server.services.access.tokens import (
+    Children,
+    ChildrenError,
+    create_own_token,
+    list_tokens,
+    secret_of_form,
+)
 from silo_server.services.access.users import get_user, list_users
 from silo_server.services.mode import change_mode
 from silo_server.standing import standing
@@ -475,9 +481,24 @@ def create_token(call: Reader, form: Form) -> Response:
 
 @router.post("/account/tokens/{token_id}/revoke")
 def revoke_token(call: Reader, token_id: TokenId, form: Form) -> Response:
-    """Revoke a token: one's own, or anybody's for an admin."""
-    revoke(call, token_id)
-    return back("/users" if text(form, "from") == "users" else "/account", _("The token is revoked."))
+    """Revoke a token: one's own, or anybody's for an admin. What was made with it is shown first."""
+    origin, chosen = "users" if text(form, "from") == "users" else "account", text(form, "children")
+    try:
+        revoke(call, token_id, Children(chosen) if chosen in list(Children) else None)
+    except ChildrenError as error:
+        return page(call, "token_children.html", token_id=token_id, living=error.living, origin=origin)
+    return back(f"/{origin}", _("The token is revoked."))
+
+
+@router.post("/account/logout-everywhere")
+def log_out_everywhere(call: Reader) -> Response:
+    """End all sessions of the user, and what was made in them."""
+    sessions.log_out_everywhere(call.server.db, call.actor)
+    response = back(
+        "/login", _("You are logged out everywhere. Tokens that were made in your sessions have ended.")
+    )
+    response.delete_cookie(SESSION_COOKIE)
+    return response
 
 
 @router.post("/account/password")

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import re
 
-from sqlalchemy import select, update
+from sqlalchemy import select
 
 from silo.bom.errors import ConfigError
 from silo_server.db.tables import api_tokens, users
 from silo_server.db.transaction import Tx
+from silo_server.services.access.credentials import end_below
 from silo_server.services.access.tokens import CONFIGURED, create_token, secret_hash
 from silo_server.services.audit import note
 from silo_server.times import wire_time
@@ -38,9 +39,11 @@ def take_configured_token(tx: Tx, user_id: int, secret: str) -> str:
     elif not row.active or (row.expires_at is not None and row.expires_at <= tx.stamp):
         return "its user is not active" if not row.active else f"it ended on {wire_time(row.expires_at)}"
     others = (api_tokens.c.name == CONFIGURED) & (api_tokens.c.token_hash != secret_hash(secret))
-    gone = update(api_tokens).where(others, api_tokens.c.revoked_at.is_(None)).values(revoked_at=tx.stamp)
-    if tx.conn.execute(gone).rowcount:
-        note(tx, "token.revoked", CONFIGURED, "the environment has another")
+    gone = select(api_tokens.c.credential_id).where(others, api_tokens.c.revoked_at.is_(None))
+    if replaced := list(tx.conn.scalars(gone)):
+        # Who changes the secret may do so because it leaked: what was made with it ends as well.
+        ended = end_below(tx, replaced, themselves=True)
+        note(tx, "token.revoked", CONFIGURED, f"the environment has another; {ended} ended")
     return ""
 
 

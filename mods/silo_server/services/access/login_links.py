@@ -13,6 +13,7 @@ from silo_server.actors import Actor, Role
 from silo_server.db.database import Database
 from silo_server.db.tables import login_links, users
 from silo_server.db.transaction import Tx
+from silo_server.services.access.credentials import Kind, new_credential
 from silo_server.services.access.sessions import NewSession, begin_session
 from silo_server.services.access.tokens import check_lasting, secret_hash
 from silo_server.services.access.users import get_user
@@ -36,8 +37,11 @@ def create_login_link(tx: Tx, username: str) -> str:
     secret = secrets.token_urlsafe(32)
     expires = stamp(tx.at + timedelta(seconds=tx.settings.login_link_seconds))
     tx.conn.execute(delete(login_links).where(login_links.c.expires_at <= tx.stamp))
+    credential = new_credential(tx, Kind.LINK, user.id, "", tx.actor.credential_id)
     tx.conn.execute(
-        insert(login_links).values(token_hash=secret_hash(secret), user_id=user.id, expires_at=expires)
+        insert(login_links).values(
+            token_hash=secret_hash(secret), user_id=user.id, expires_at=expires, credential_id=credential
+        )
     )
     return secret
 
@@ -48,7 +52,7 @@ def use_login_link(db: Database, secret: str, address: str) -> NewSession:
         row = tx.conn.execute(
             delete(login_links)
             .where(login_links.c.token_hash == secret_hash(secret))
-            .returning(login_links.c.user_id, login_links.c.expires_at)
+            .returning(login_links.c.user_id, login_links.c.expires_at, login_links.c.credential_id)
         ).one_or_none()
         if row is not None and row.expires_at > tx.stamp:
             user = tx.conn.execute(
@@ -56,5 +60,5 @@ def use_login_link(db: Database, secret: str, address: str) -> NewSession:
             ).one_or_none()
             if user is not None:
                 note(tx, "login.link", user.username)
-                return begin_session(tx, user.id, user.username, by_link=True)
+                return begin_session(tx, user.id, user.username, by_link=True, parent=row.credential_id)
     raise AuthError("this login link was used already or is too old; start the server again for a new one")

@@ -17,6 +17,7 @@ from silo_server.actors import Actor, Role
 from silo_server.db.database import Database
 from silo_server.db.tables import sessions, users
 from silo_server.db.transaction import LOGIN_LOCK, Tx
+from silo_server.services.access.credentials import Kind, end_sessions_of, new_credential
 from silo_server.services.access.login_attempts import (
     FAILED,
     PROVED,
@@ -25,7 +26,7 @@ from silo_server.services.access.login_attempts import (
     settle_attempt,
 )
 from silo_server.services.access.passwords import password_fits
-from silo_server.services.access.tokens import secret_hash
+from silo_server.services.access.tokens import check_may_change, secret_hash
 from silo_server.services.access.users import NO_TOKEN, User, change_user, row_of, to_user
 from silo_server.services.audit import note
 from silo_server.times import stamp
@@ -98,6 +99,7 @@ def actor_by_session(db: Database, secret: str, address: str) -> Actor | None:
                 sessions.c.id_hash,
                 sessions.c.csrf_token,
                 sessions.c.by_link,
+                sessions.c.credential_id,
                 users.c.id,
                 users.c.username,
                 users.c.display_name,
@@ -120,6 +122,7 @@ def actor_by_session(db: Database, secret: str, address: str) -> Actor | None:
         row.csrf_token,
         row.id_hash,
         by_link=bool(row.by_link),
+        credential_id=row.credential_id,
     )
 
 
@@ -132,11 +135,23 @@ def log_out(db: Database, actor: Actor) -> None:
         note(tx, "logout")
 
 
-def begin_session(tx: Tx, user_id: int, username: str, *, by_link: bool = False) -> NewSession:
-    """Begin a session of a user; sessions that are over are deleted."""
+def log_out_everywhere(db: Database, actor: Actor) -> int:
+    """End all sessions of the caller and what was made in them; return how many credentials ended."""
+    with db.write(actor, even_when_read_only=True) as tx:
+        check_may_change(actor)
+        ended = end_sessions_of(tx, actor.own_id)
+        note(tx, "logout.everywhere", actor.username, f"{ended} ended")
+        return ended
+
+
+def begin_session(
+    tx: Tx, user_id: int, username: str, *, by_link: bool = False, parent: int | None = None
+) -> NewSession:
+    """Begin a session of a user, below the credential ``parent``; sessions that are over are deleted."""
     secret, csrf = secrets.token_urlsafe(32), secrets.token_urlsafe(32)
     expires = stamp(tx.at + timedelta(seconds=tx.settings.session_seconds))
     tx.conn.execute(delete(sessions).where(sessions.c.expires_at <= tx.stamp))
+    credential = new_credential(tx, Kind.SESSION, user_id, tx.actor.address, parent)
     tx.conn.execute(
         insert(sessions).values(
             id_hash=secret_hash(secret),
@@ -145,6 +160,7 @@ def begin_session(tx: Tx, user_id: int, username: str, *, by_link: bool = False)
             by_link=by_link,
             created_at=tx.stamp,
             expires_at=expires,
+            credential_id=credential,
         )
     )
     return NewSession(secret, csrf, username, expires)

@@ -10,18 +10,22 @@ from __future__ import annotations
 import hashlib
 import hmac
 import secrets
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import timedelta
+from enum import StrEnum
+from typing import Any
 
 from sqlalchemy import insert, select, update
 
-from silo.bom.errors import ConflictError, ForbiddenError, NotFoundError, RejectedError
+from silo.bom.errors import ConflictError, ForbiddenError, NotFoundError, RejectedError, listed
 from silo_server.actors import Actor, Role, Scope
 from silo_server.db.database import Database
 from silo_server.db.rows import update_rows
-from silo_server.db.tables import api_tokens, users
+from silo_server.db.tables import api_tokens, credentials, users
 from silo_server.db.transaction import Tx
 from silo_server.fields import from_row
+from silo_server.services.access.credentials import Credential, Kind, below, end_below, new_credential
 from silo_server.services.audit import note
 from silo_server.times import stamp, wire_time
 
@@ -51,8 +55,22 @@ PROGRAM_DAYS = 90
 
 
 @dataclass(frozen=True, slots=True)
+class Parent:
+    """The credential that made a token; ``known`` is false if an older version made the token."""
+
+    credential_id: int | None
+    kind: str
+    name: str
+    known: bool
+
+
+@dataclass(frozen=True, slots=True)
 class Token:
-    """An API token as it may be shown: never its secret."""
+    """An API token as it may be shown: never its secret.
+
+    parent
+        None if the server itself made it.
+    """
 
     id: int
     username: str
@@ -63,6 +81,8 @@ class Token:
     expires_at: str | None
     last_used_at: str | None
     revoked_at: str | None
+    credential_id: int
+    parent: Parent | None
 
 
 def secret_hash(secret: str) -> str:
@@ -162,6 +182,8 @@ def create_token(
 ) -> tuple[Token, str]:
     """Make a token for a user; return it with its secret, which is never shown again."""
     secret = "" if hashed else secret or PREFIX + secrets.token_hex(20)
+    parent = tx.actor.credential_id
+    credential = new_credential(tx, Kind.TOKEN, user_id, name, parent)
     token_id = tx.conn.execute(
         insert(api_tokens)
         .values(
@@ -172,6 +194,7 @@ def create_token(
             scope=scope.value,
             created_at=tx.stamp,
             expires_at=expires,
+            credential_id=credential,
         )
         .returning(api_tokens.c.id)
     ).scalar_one()
@@ -186,24 +209,71 @@ def shown_prefix(secret: str) -> str:
 
 def list_tokens(tx: Tx, user_id: int | None = None) -> list[Token]:
     """Read the tokens of a user, or of everybody, newest first."""
+    above = credentials.alias()
     query = (
-        select(api_tokens, users.c.username)
+        select(
+            api_tokens,
+            users.c.username,
+            credentials.c.known,
+            above.c.id.label("parent_id"),
+            above.c.kind.label("parent_kind"),
+            above.c.name.label("parent_name"),
+        )
         .join(users, users.c.id == api_tokens.c.user_id)
+        .join(credentials, credentials.c.id == api_tokens.c.credential_id)
+        .outerjoin(above, above.c.id == credentials.c.parent_id)
         .order_by(api_tokens.c.id.desc())
     )
     if user_id is not None:
         query = query.where(api_tokens.c.user_id == user_id)
-    return [from_row(Token, row, scope=Scope(row.scope)) for row in tx.conn.execute(query)]
+    return [
+        from_row(Token, row, scope=Scope(row.scope), parent=_parent(row)) for row in tx.conn.execute(query)
+    ]
 
 
-def revoke_token(tx: Tx, token_id: int, user_id: int | None) -> None:
-    """Revoke a token at once: one of the user or, if ``user_id`` is None, anybody's."""
-    query = select(api_tokens.c.name).where(api_tokens.c.id == token_id)
+def _parent(row: Any) -> Parent | None:
+    if not row.known:
+        return Parent(None, "", "", known=False)
+    if row.parent_id is None:
+        return None
+    return Parent(row.parent_id, row.parent_kind, row.parent_name, known=True)
+
+
+class ChildrenError(ConflictError):
+    """A token has credentials below it that live on; who revokes it says what becomes of them."""
+
+    def __init__(self, name: str, living: Sequence[Credential]) -> None:
+        names = listed([f"{each.kind} {each.name or each.username}" for each in living], 8)
+        super().__init__(
+            f"token {name}: below it live {names}; say if they end as well (children=end, as after a leak) "
+            "or stay (children=keep)"
+        )
+        self.living = tuple(living)
+
+
+class Children(StrEnum):
+    """What becomes of the credentials below a token that is revoked."""
+
+    KEEP = "keep"
+    END = "end"
+
+
+def revoke_token(tx: Tx, token_id: int, user_id: int | None, children: Children | None = None) -> None:
+    """Revoke a token at once: one of the user or, if ``user_id`` is None, anybody's.
+
+    Raises ChildrenError if credentials below it live on and ``children`` does not say what becomes of them.
+    """
+    query = select(api_tokens.c.name, api_tokens.c.credential_id).where(api_tokens.c.id == token_id)
     if user_id is not None:
         query = query.where(api_tokens.c.user_id == user_id)
-    name = tx.conn.scalar(query)
-    if name is None:
+    row = tx.conn.execute(query).one_or_none()
+    if row is None:
         raise NotFoundError(f"there is no token {token_id} of yours")
+    name = row.name
+    if children is None and (living := below(tx, [row.credential_id])):
+        raise ChildrenError(name, living)
+    if children is Children.END and (ended := end_below(tx, [row.credential_id])):
+        note(tx, "token.children_ended", name, str(ended))
     tx.conn.execute(
         update(api_tokens)
         .where(api_tokens.c.id == token_id, api_tokens.c.revoked_at.is_(None))
@@ -222,6 +292,7 @@ def actor_by_token(db: Database, secret: str, address: str) -> Actor | None:
                 api_tokens.c.last_used_at,
                 api_tokens.c.scope,
                 api_tokens.c.expires_at,
+                api_tokens.c.credential_id,
                 users.c.id.label("user_id"),
                 users.c.username,
                 users.c.display_name,
@@ -250,6 +321,7 @@ def actor_by_token(db: Database, secret: str, address: str) -> Actor | None:
         address,
         scope=scope,
         expires_at=row.expires_at,
+        credential_id=row.credential_id,
     )
 
 
