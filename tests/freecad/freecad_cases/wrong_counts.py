@@ -21,7 +21,7 @@ import Part
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "mods"))
 
-from silo.bom.walk import arrays, joints, kinds, links, roles, roots, targets, tree
+from silo.bom.walk import arrays, facts, joints, kinds, links, operands, roles, roots, targets, tree
 from silo.workbench.freecad import host, live, witness
 
 
@@ -138,14 +138,14 @@ def always(answer: Any) -> Any:
 EITHER = {
     "an array counts one more": ((targets,), "array_count", one_more),
     "all counts twice": ((tree.Tree,), "times", lambda old: lambda one, name: 2 * old(one, name)),
-    "links are construction": ((roles,), "no_component", always("a joint")),
+    "links are construction": ((facts,), "no_component", always("a joint")),
 }
 FAULTS: dict[Any, dict[str, Any]] = {
     with_everything: {
         **EITHER,
         "a Draft array counts one more": ((roles,), "draft_count", one_more),
         "hidden sources count": ((tree.Tree,), "visible", always(True)),
-        "operands count": ((roles,), "consumed", always({})),
+        "operands count": ((operands.Consumers,), "of", always(None)),
         "excluded ones count": ((roles, arrays, tree, targets), "left_out_by", always("")),
         "hidden screws beside count": ((roots,), "is_switched_on", always(True)),
         "screws beside do not count": ((links,), "silent_reader", without_beside),

@@ -2,35 +2,45 @@
 """The geometry as witness: the solids that FreeCAD itself shows, against those that the BOM explains.
 
 FreeCAD says by sub-object paths what an assembly shows (:class:`host.Pieces`); nothing of the BOM goes into
-that. Each object of the assembly is then compared with what its role predicts: so many components, with so
-many solids each; and the lines of the BOM are compared with the roles.
+that, and no role of an object is believed. Each object of the assembly is then compared with what the count
+explains: so many components, with so many solids each; and the lines of the BOM are compared with the count.
+What is shown and does not count is right only where a finding names this object.
 """
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from silo.bom.entry import BomEntry, Extraction, walk_entries
+from silo.bom.findings import FindingCode
 from silo.bom.key import Key
 from silo.bom.walk.chains import chains
-from silo.bom.walk.contents import Count, Lost, ObjectRole
+from silo.bom.walk.contents import Count, Lost
 from silo.bom.walk.document import object_name
 from silo.bom.walk.kinds import COMPONENTS, REPEATERS, Kind, kind_of
-from silo.bom.walk.roots import choose_assembly, fates, silent_reader
-from silo.bom.walk.standard import STANDARD_PARTS
+from silo.bom.walk.roots import choose_assembly, silent_reader
+from silo.bom.walk.standard import STANDARD_PARTS, fastener_type, is_tool
 from silo.bom.walk.tree import Tree
 from silo.workbench.freecad import host
 from silo.workbench.freecad.live import LinkInspector, cached_document, canonical_paths
 
-# What is shown and not counted, on purpose.
-_LEFT_OUT = (ObjectRole.LEFT_OUT, ObjectRole.OPERAND, ObjectRole.CONSTRUCTION)
+# What is shown and not counted, on purpose: a finding of one of these names the object.
+_NAMED_SHOWN = frozenset(
+    {
+        *(FindingCode.CONSUMED, FindingCode.MODIFIED_HERE, FindingCode.COINCIDENT, FindingCode.NO_HARDWARE),
+        *(FindingCode.SUPPRESSED, FindingCode.EXCLUDED),
+    }
+)
+_NAMED_HIDDEN = _NAMED_SHOWN | {FindingCode.HIDDEN}
 
+# Links count whatever a feature makes of them.
 _BOUGHT = COMPONENTS | {Kind.STANDARD}
-
-_USERS = ("LinkedObject", "Base", "Source", "Links", "Objects", "Tool", "Shapes", "LinkCopyOnChangeSource")
+_SHOWN_BY = ("LinkedObject", "Base", "Source", "Links", "Objects", "LinkCopyOnChangeSource")
+_TAKEN_BY = ("Tool", "Shapes", "BaseFeature", "Sections", "Faces", "Bodies", "Sources", "Subtractions")
 
 
 @dataclass(frozen=True)
@@ -86,7 +96,8 @@ class SolidCount:
     def sentence(self) -> str:
         """Describe the comparison in a sentence, for people."""
         solids = "1 solid" if self.shown == 1 else f"{self.shown} solids"
-        text = f"{self.label}: the view has {solids}, the BOM explains {self.explained}"
+        file = os.path.basename(self.doc_path)
+        text = f"{self.label} in {file}: the view has {solids}, the BOM explains {self.explained}"
         further = (
             (self.hidden, "of these hidden"),
             (self.beside, "beside the assembly"),
@@ -125,6 +136,8 @@ class _Witness:
         self._documents: dict[str, Any] = {}
         self._own_shapes: dict[tuple[str, str], int] = {}
         self._canonical = canonical_paths()
+        self._named_shown: set[Key] = set()
+        self._named_hidden: set[Key] = set()
 
     def accounts(self, extraction: Extraction) -> list[SolidCount]:
         head = extraction.assembly
@@ -138,6 +151,13 @@ class _Witness:
         for entry in walk_entries(extraction.entries):
             if entry.is_assembly and (obj := self._object(entry)) is not None:
                 read.append((obj, entry, (*entry.children, *entry.own)))
+        for finding in extraction.findings:
+            for place in finding.where:
+                path = self._canonical(place.doc_path)
+                if finding.code in _NAMED_SHOWN:
+                    self._named_shown.add((path, place.obj))
+                if finding.code in _NAMED_HIDDEN:
+                    self._named_hidden.add((path, place.obj))
         return [self._account(*account) for account in read]
 
     def _document(self, path: str) -> Any:
@@ -154,7 +174,6 @@ class _Witness:
     def _account(self, obj: Any, head: BomEntry, lines: Sequence[BomEntry]) -> SolidCount:
         account = SolidCount(head.doc_path, head.object_name, head.label)
         contents = self._reader.contents(obj)
-        roles = fates(obj, contents, self._reader)
         top, is_array = host.real(obj), kind_of(obj) in REPEATERS
         see = host.Pieces(self._own_shapes, None if is_array else top)
         own = contents.own if head.own or not contents.is_assembly(obj) else []
@@ -173,7 +192,7 @@ class _Witness:
         else:
             inside = host.sub_objects(top) or []
         # An array is its own only member.
-        shown = [(top, True)] if is_array else _members(inside, roles)
+        shown = [(top, True)] if is_array else _members(inside, predicted)
         seen_by_path: dict[str, _Seen] = {}
         for one, is_visible in (*shown, *((member, member.Visibility) for member in beside.values())):
             seen_by_path.setdefault(one.Name, _Seen(one)).add(see.of(one, is_visible))
@@ -183,10 +202,42 @@ class _Witness:
             account.left_out += seen.left_out
             account.beside += seen.shown if name in beside else 0
             account.explained += predicted[name]
-            _judge(account, seen, roles, predicted[name], may_hide=name not in beside)
+            self._judge(account, seen, predicted[name], obj.Document, may_hide=name not in beside)
         if own or not contents.own:  # a part is not an assembly of its bodies
             self._compare_lines(account, lines, pieces)
         return account
+
+    def _judge(
+        self, account: SolidCount, seen: _Seen, explained: int, document: Any, *, may_hide: bool
+    ) -> None:
+        obj = host.real(seen.obj)
+        kind, key = kind_of(obj), (self._canonical(document.FileName), obj.Name)
+        is_bought = kind in _BOUGHT
+        is_shown = _is_used_by(obj, _SHOWN_BY, but_features=kind in COMPONENTS)
+        is_taken = kind not in COMPONENTS and _is_used_by(obj, (*_SHOWN_BY, *_TAKEN_BY))
+        if seen.shown == explained:
+            if explained or not seen.hidden or key in self._named_hidden:
+                return
+            if is_shown or is_taken:
+                account.sources += seen.hidden
+            else:
+                account.differ(obj, 0, 0, "hidden and not counted")
+        elif (
+            seen.shown < explained <= seen.shown + seen.hidden
+            and may_hide
+            and (seen.shown or not (is_shown or is_taken))
+        ):
+            account.hidden += explained - seen.shown
+        elif not explained and (
+            key in self._named_shown
+            or is_tool(fastener_type(obj))  # taps and dies are drawn, and no part of the product
+            or (is_taken and not is_bought and not self._reader.has_view(document))
+        ):
+            account.left_out += seen.shown
+        else:
+            account.differ(
+                obj, seen.shown, explained, "counted" if explained else "neither counted nor named"
+            )
 
     def _drawn(self, count: Count, tree: Tree | None) -> Any:
         """Return the component; if it is not open in FreeCAD, the object that stands for it in the
@@ -204,7 +255,7 @@ class _Witness:
         """Report lines whose quantity differs from the number of pieces, and pieces without a line."""
         left = Counter(pieces)
         for line in lines:
-            registered = (line.doc_path, line.object_name)
+            registered = line.key if line.variant else (line.doc_path, line.object_name)
             key = registered if registered in pieces or not line.standard else (STANDARD_PARTS, line.standard)
             left[key] -= line.quantity
         for (path, name), number in left.items():
@@ -216,14 +267,22 @@ class _Witness:
 
 
 def _members(
-    listed: Sequence[tuple[Any, bool]], roles: Mapping[str, ObjectRole | None], visible: bool = True
+    listed: Sequence[tuple[Any, bool]], explained: Mapping[str, int], visible: bool = True
 ) -> Iterator[tuple[Any, bool]]:
-    """Yield each object that is not only a holder, once for each path, with its visibility there."""
+    """Yield each object that counts or holds nothing, once for each path, with its visibility there."""
     for member, is_visible in listed:
-        if roles.get(member.Name) is ObjectRole.HOLDER:
-            yield from _members(host.sub_objects(member) or [], roles, visible and is_visible)
+        if _is_holder(member) and member.Name not in explained:
+            yield from _members(host.sub_objects(member) or [], explained, visible and is_visible)
         else:
             yield member, visible and is_visible
+
+
+def _is_holder(obj: Any) -> bool:
+    """Return True for a container whose members count by themselves, by its type alone."""
+    if obj.isDerivedFrom("Assembly::AssemblyLink"):
+        return False
+    kinds = ("App::Part", "App::LinkGroup", "App::DocumentObjectGroup")
+    return any(map(obj.isDerivedFrom, kinds)) or kind_of(obj) is Kind.CONTAINER
 
 
 @dataclass
@@ -241,35 +300,14 @@ class _Seen:
         self.left_out += solids[2]
 
 
-def _judge(
-    account: SolidCount,
-    seen: _Seen,
-    roles: Mapping[str, ObjectRole | None],
-    explained: int,
-    *,
-    may_hide: bool,
-) -> None:
-    obj, role = seen.obj, roles.get(seen.obj.Name)
-    kind = kind_of(obj)
-    is_source = _is_used_by(obj, roles)
-    if seen.shown == explained:
-        if role is ObjectRole.SOURCE and is_source:
-            account.sources += seen.hidden
-        elif seen.hidden and not explained and role not in _LEFT_OUT and kind in _BOUGHT:
-            account.differ(obj, 0, 0, "hidden and not counted")
-    elif seen.shown < explained <= seen.shown + seen.hidden and may_hide and (seen.shown or not is_source):
-        account.hidden += explained - seen.shown
-    elif not explained and role in _LEFT_OUT and not (role is ObjectRole.CONSTRUCTION and kind in _BOUGHT):
-        account.left_out += seen.shown
-    else:
-        account.differ(obj, seen.shown, explained, "no role" if role is None else role.value)
-
-
-def _is_used_by(obj: Any, others: Mapping[str, ObjectRole | None]) -> bool:
-    """Return True if one of these objects shows or consumes this one: a link, an array, a compound, a cut."""
+def _is_used_by(obj: Any, properties: Sequence[str], *, but_features: bool = False) -> bool:
+    """Return True if another object of its document shows or takes this one, in one of these properties."""
     for user in obj.InList:
-        for name in _USERS if user.Document == obj.Document and user.Name in others else ():
+        if but_features and kind_of(user) is Kind.LOCAL:
+            continue
+        for name in properties if user.Document == obj.Document else ():
             value = getattr(user, name, None) if name in user.PropertiesList else None
-            if obj in (value if isinstance(value, list | tuple) else (value,)):
+            several = value if isinstance(value, list | tuple) else (value,)
+            if any((one[0] if isinstance(one, tuple) and one else one) == obj for one in several):
                 return True
     return False
