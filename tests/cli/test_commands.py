@@ -345,8 +345,8 @@ def test_the_order_list_is_that_of_the_server(run: Any, silo: Any, gearbox: Path
     for wrong, code, why in (
         (("order", "X99-9999"), 2, "there is no item"),
         (("order", number, "--supplier", "Misumi"), 2, "does nothing without --csv or --xlsx"),
-        (("order", number, "--revision", "B"), 3, "B"),
-        (("order", number, "--spares", "many"), 3, "spares"),
+        (("order", number, "--release", "B"), 2, "B"),
+        (("order", number, "--spares", "many"), 2, "spares"),
     ):
         ran = run(*wrong)
         assert (ran.code, why in ran.err) == (code, True), ran.err

@@ -113,10 +113,10 @@ def test_logout_forgets_what_login_kept(run: Any, silo: Any, monkeypatch: pytest
 
 @pytest.mark.usefixtures("synced")
 def test_search_show_and_whoami(run: Any, silo: Any, gearbox: Path) -> None:
-    (found,) = run("search", "base", "plate", "--json").json()
+    (found,) = run("search", "base", "plate", "--json").json()["items"]
     assert found["name"] == "Base Plate"
     assert run("search", "no-such-words").code == 1
-    (top,) = run("search", "Top Assembly", "--json").json()
+    (top,) = run("search", "Top Assembly", "--json").json()["items"]
     told = run("show", top["part_number"], "--json").json()
     assert found["part_number"] in {line["part_number"] for line in told["bom"]}
     assert told["page"].startswith(silo.client.base_url)
@@ -125,10 +125,11 @@ def test_search_show_and_whoami(run: Any, silo: Any, gearbox: Path) -> None:
     assert (who["url"], who["username"]) == (silo.client.base_url, "admin")
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh"])
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_the_shell_completes_every_command(run: Any, shell: str, tmp_path: Path) -> None:
     script = run("completion", shell).out
-    assert all(name in script for name in ("bom-diff", "install-addon", "--recursive", "whoami"))
+    option = "-l recursive" if shell == "fish" else "--recursive"
+    assert all(name in script for name in ("bom-diff", "install-addon", option, "whoami"))
     program = shutil.which(shell)
     if program is not None:
         (tmp_path / "script").write_text(script)

@@ -43,16 +43,16 @@ def test_the_list_says_what_the_pane_says(run: Any, queue: Queue) -> None:
     assert ran.code == 1
     told = ran.json()
     pane = {row.title: row for row in rows(queue.store.entries(), queue.url)}
-    assert [(one["number"], one["label"]) for one in told["commits"]] == [
+    assert [(one["number"], one["label"]) for one in told["items"]] == [
         *zip(queue.ids, ("One", "Two", "Three"), strict=True)
     ]
-    for one in told["commits"]:
+    for one in told["items"]:
         row = pane[one["label"]]
         assert (one["what"], one["state"], one["reason"], one["needs_a_person"]) == (
             *(row.what, row.state, row.reason),
             row.urgent,
         )
-    assert [one["state"] for one in told["commits"]] == [
+    assert [one["state"] for one in told["items"]] == [
         *("waiting", "held for your choice", "for another server")
     ]
     assert "413: [bold]too large" in " ".join(run("queue").out.split())
@@ -70,7 +70,7 @@ def test_a_pause_is_said_once_and_ends_with_retry(
     queue.store.set_pause(queue.url, Pause(now + until, "silo is busy", "busy", 1, told=True))
     told = run("queue", "--json").json()
     assert told["pause"].endswith(said)
-    assert told["commits"][0]["state"] == "paused"
+    assert told["items"][0]["state"] == "paused"
     ran = run("queue", "retry")
     assert (ran.code, "M01-0001 One is in Silo" in ran.err) == (1, True)
     assert [entry.label for entry in queue.store.entries()] == ["Two", "Three"]

@@ -28,6 +28,8 @@ from silo.bom.text import name_key
 from silo.bom.walk.identity import as_uuid
 from silo.checksums import bare_checksum
 
+USUAL_SCHEMA = "kindred-rd"
+
 
 class ItemBody(ItemTexts):
     """``POST /api/items``. The server makes the part number from schema and category.
@@ -279,8 +281,9 @@ class ItemCalls(FileCalls):
         """Return the part-number schema as the server describes it."""
         return self._get(f"schema {name}", "schemas", name).mapping()
 
-    def find_schema(self, wanted: str = "kindred-rd") -> str:
-        """Find the name of the part-number schema to use: the wanted one, else the server's only one.
+    def find_schema(self, wanted: str = USUAL_SCHEMA) -> str:
+        """Find the name of the part-number schema to use: the wanted one; for the usual one, which nobody
+        chose, also the server's only one.
 
         Raises :class:`InputError` that lists the schemas if there are several others, or none.
         """
@@ -302,7 +305,7 @@ class ItemCalls(FileCalls):
         except NotFoundError:
             raise missing from None
         names = schema_names(data)
-        if len(names) == 1:
+        if len(names) == 1 and wanted == USUAL_SCHEMA:
             return names[0]
         host = self._address.host
         if not names:

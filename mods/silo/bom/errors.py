@@ -47,9 +47,9 @@ class Exit(IntEnum):
     """What every command and job ends with, and what documents and scripts rely on."""
 
     DONE = 0
-    UNDONE = 1  # differences with --check, or something was left undone; the output says what
-    BAD_INPUT = 2  # an argument, a file or the configuration cannot be used
-    REMOTE = 3  # the server, or the way to it
+    UNDONE = 1  # something differs, was left out, is held or waits; the output says what
+    BAD_INPUT = 2  # an argument, a file or the configuration cannot be used, whoever notices it
+    REMOTE = 3  # no server, or no right
     CANCELLED = 130  # Ctrl-C, SIGINT or SIGTERM
 
 
@@ -57,7 +57,10 @@ def exit_of(error: BaseException) -> Exit:
     """Return the exit code of an error; it says whose fault the error is."""
     if isinstance(error, KeyboardInterrupt | CancelledError):
         return Exit.CANCELLED
-    return Exit.REMOTE if isinstance(error, RemoteError | ConflictError) else Exit.BAD_INPUT
+    if isinstance(error, ConflictError):  # two truths met: a person decides
+        return Exit.UNDONE
+    refused = isinstance(error, RejectedError) or type(error) is NotFoundError
+    return Exit.REMOTE if isinstance(error, RemoteError) and not refused else Exit.BAD_INPUT
 
 
 def did_you_mean(given: str, candidates: Iterable[str]) -> str:

@@ -5,12 +5,18 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Sequence
 from typing import Any
 
 
 def print_json(data: Any) -> None:
     """Print JSON on standard output; escaped if that is not UTF-8, or if a file's name is not."""
     print(json_text(data, indent=2))
+
+
+def print_json_list(items: Sequence[Any], total: int | None = None) -> None:
+    """Print a list in the one envelope of lists; ``total``: how many there are, if not all are printed."""
+    print_json({"items": list(items), "total": len(items) if total is None else total})
 
 
 def json_text(data: Any, indent: int | None = None) -> str:

@@ -327,7 +327,7 @@ _Waiting = _shape(
     since=_described(float, "seconds since 1970"),
     needs_a_person=bool,
 )
-Queue = _shape("Queue", pause=str | None, commits=_many(_Waiting))
+Queue = _shape("Queue", pause=str | None, items=_many(_Waiting), total=int)
 
 Log = _shape(
     "Log",
@@ -373,6 +373,8 @@ Event = _shape("Event", doc="One line each, as they come.", id=str | None, type=
 Login = _shape("Login", url=str, username=str | None, role=str | None, configuration=str)
 Found = _shape("Found", part_number=str, name=str, item_type=str)
 ItemLine = _shape("ItemLine", part_number=str, name=str, quantity=float | None, source=str | None)
+FoundItems = _shape("FoundItems", items=_many(Found), total=int)
+Commands = _shape("Commands", items=list[str], total=int)
 Shown = _shape("Shown", base=Found, current_revision=int, page=str, bom=_many(ItemLine))
 Whoami = _shape("Whoami", url=str, from_=str, username=str | None, role=str | None)
 Logout = _shape("Logout", configuration=str, removed=bool)
@@ -419,7 +421,7 @@ SHAPES: dict[str, Any] = {
     "pull": Pulled,
     "log": Log | Changed,
     "queue": Queue,
-    "search": _many(Found),
+    "search": FoundItems,
     "show": Shown,
     "order": OrderList,
     "import": Imported,
@@ -434,7 +436,7 @@ SHAPES: dict[str, Any] = {
     "login": Login,
     "install-addon": Addon,
     "links": LinkMap,
-    "schema": list[str],
+    "schema": Commands,
 }
 
 NAMES = (*SHAPES, "inertia", "mass")

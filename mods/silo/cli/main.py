@@ -17,6 +17,7 @@ from typing import Any
 
 from silo import spoken
 from silo.bom.errors import CancelledError, Exit, InputError, SiloError, exit_of
+from silo.bom.message import message
 from silo.cli.parser import build_parser
 from silo.cli.streams import OutputStream, open_streams
 
@@ -67,6 +68,8 @@ def _run(argv: Sequence[str] | None) -> int:
             return _run_each(args)
     except SystemExit as end:  # argparse: --help and --version are output like any other
         return end.code if isinstance(end.code, int) else Exit.BAD_INPUT
+    except EOFError:  # Ctrl-D, or the end of a pipe, where a question waits for an answer
+        return _failed(InputError(message("no answer was given, and nothing was done")), words)
     except KeyboardInterrupt:
         return _failed(CancelledError("\nCancelled."), words)
     except OSError as error:
@@ -108,9 +111,9 @@ def _run_each(args: argparse.Namespace) -> int:
             codes.append(_failed(error, ()))
             printed.append(_as_json(error))
     if args.json:
-        from silo.cli.json_output import print_json
+        from silo.cli.json_output import print_json_list
 
-        print_json(printed)
+        print_json_list(printed)
     return max(codes)
 
 

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import argparse
 import os
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from silo.bom.errors import InputError
+from silo.bom.message import message
 
 READING = ("--index", "--no-cache", "--jobs", "--dask")
 
@@ -158,6 +160,38 @@ def add_options(parser: argparse._ActionsContainer, helps: Mapping[str, str]) ->
             how = {"metavar": value.removesuffix("...")}
             how |= {"action": "append", "default": []} if value.endswith("...") else {}
         parser.add_argument(option, help=text, **how)
+
+
+def add_old_name(parser: argparse.ArgumentParser, old: str, option: str) -> None:
+    """Accept the name that an option had before, for one release; it warns."""
+    action = parser._option_string_actions[option]
+    how: dict[str, Any] = {"nargs": action.nargs, "type": action.type, "choices": action.choices}
+    parser.add_argument(
+        old,
+        dest=action.dest,
+        action=_OldName,
+        option=option,
+        help=argparse.SUPPRESS,
+        default=action.default,
+        **how,
+    )
+
+
+class _OldName(argparse.Action):
+    """Sets what the option of today sets, and warns."""
+
+    def __init__(self, *names: Any, option: str, **how: Any) -> None:
+        super().__init__(*names, **how)
+        self.option = option
+
+    def __call__(
+        self, _parser: object, args: argparse.Namespace, value: Any, name: str | None = None
+    ) -> None:
+        text = message(
+            "{old} is called {new} now; the old name goes with the next release", old=name, new=self.option
+        )
+        print(f"silo-mod: {text}", file=sys.stderr)
+        setattr(args, self.dest, True if self.nargs == 0 else value)
 
 
 def only_with(parser: argparse.ArgumentParser, needed: str, *options: str) -> None:

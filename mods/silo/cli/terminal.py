@@ -17,7 +17,9 @@ from silo import spoken
 # A hostile file's name may have 60 MB; a path of the system has 4096 at most.
 _LONGEST = 5000
 
-_ENDLESS = 1_000_000
+# Of a file or a pipe: each record is one line, but no rule, box or padding grows without bound.
+_WIDEST = 20_000
+_RULE = 80
 
 
 class _Terminal(Console):
@@ -29,11 +31,18 @@ class _Terminal(Console):
         """Print; texts of ours in the person's language."""
         super().print(*(spoken(one) if isinstance(one, str) else one for one in shown), **how)
 
+    def rule(self, title: Any = "", **how: Any) -> None:
+        """Draw a line across, of a terminal's width also in a pipe."""
+        width = self.width
+        self.width = min(width, _RULE)
+        super().rule(title, **how)
+        self.width = width
+
 
 def console(stream: TextIO | None = None) -> Console:
     """Open the terminal. A file or a pipe has no width: each record is one whole line there."""
     stream = stream or sys.stdout
-    return _Terminal(file=stream, highlight=False, width=None if stream.isatty() else _ENDLESS)
+    return _Terminal(file=stream, highlight=False, width=None if stream.isatty() else _WIDEST)
 
 
 def plain(text: str) -> str:
@@ -48,5 +57,10 @@ def table_of(*titles: str) -> Table:
     """Begin a table without lines that has these headings."""
     table = Table(box=None, pad_edge=False)
     for title in titles:
-        table.add_column(spoken(title), justify="right" if title == "Quantity" else "left", overflow="fold")
+        table.add_column(
+            spoken(title),
+            justify="right" if title == "Quantity" else "left",
+            overflow="fold",
+            no_wrap=title == "Part number",
+        )
     return table

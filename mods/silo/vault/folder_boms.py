@@ -82,6 +82,28 @@ def read_folder(
     )
 
 
+def read_file(path: str, called: str = "") -> FolderBoms:
+    """Read the assemblies of one file; ``called``: the name that the file has in the result."""
+    path = os.path.realpath(path)
+    base = os.path.dirname(path)
+    findings: dict[Finding, None] = {}
+    found: list[ComparedAssembly] = []
+    with Library() as library:
+        for extraction in _extractions(library, path, {}):
+            findings.update(dict.fromkeys(f for f in extraction.findings if f.severity is Severity.ERROR))
+            found += [one for one in _assemblies(extraction) if one.head.doc_path == path]
+    return FolderBoms(
+        base,
+        tuple(_called(_relative(one, base), called) for one in found),
+        (),
+        tuple(replace(finding, message=shorten(finding.message, base)) for finding in findings),
+    )
+
+
+def _called(assembly: ComparedAssembly, name: str) -> ComparedAssembly:
+    return replace(assembly, head=replace(assembly.head, doc_path=name)) if name else assembly
+
+
 def _without(message: str, base: str, root: Path | str | None) -> str:
     """Shorten the paths in a message, also those beside the folder, since the root may be a temporary one."""
     message = shorten(message, base)

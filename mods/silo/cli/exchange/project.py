@@ -23,7 +23,11 @@ if TYPE_CHECKING:
 
 def _add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "tops", metavar="TOP", nargs="+", help="assembly files with all below them, or the project's folder"
+        "tops",
+        metavar="TOP",
+        nargs="*",
+        default=["."],
+        help="assembly files with all below them, or the project's folder (default: this folder)",
     )
 
 

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 def add_queue(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "do",
+        metavar="list|retry|discard|save",
         nargs="?",
         choices=("list", "retry", "discard", "save"),
         default="list",
@@ -124,7 +125,7 @@ def _show_queue(
             }
             for pending, said in queue_rows
         ]
-        print_json({"pause": notice or None, "commits": rows})
+        print_json({"pause": notice or None, "items": rows, "total": len(rows)})
         return
     out = console()
     if notice:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from silo.batch import SyncOptions, TopResult
-from silo.bom.errors import InputError
+from silo.bom.errors import DocumentError, Exit, InputError
 from silo.cli.connection import client_of, reach
 from silo.cli.options import EACH, add_options
 from silo.cli.progress import count_steps, set_step
@@ -29,7 +29,11 @@ if TYPE_CHECKING:
 def add_sync(parser: argparse.ArgumentParser) -> None:
     """Add the command."""
     parser.add_argument(
-        "tops", metavar="TOP", nargs="+", help="assembly files, or folders: all assemblies below them"
+        "tops",
+        metavar="TOP",
+        nargs="*",
+        default=["."],
+        help="assembly files, or folders: all assemblies below them (default: this folder)",
     )
     add_options(parser, {"--verbose": "each assembly that changes, and each file at fault"})
 
@@ -62,10 +66,12 @@ def run_sync(args: argparse.Namespace) -> int:
         pages = [path for path in args.report if path.lower().endswith(".html")]
         summary.page = os.path.realpath(pages[0]) if pages else ""
         shown = _Shown(args, many=len(tops) > 1)
-        ended = None
+        ended, unusable = None, False
+        named = {top for top in args.tops if not os.path.isdir(top)}
         try:
             for result in _results(args, tops, options, client, summary, stop):
                 summary.add(result)
+                unusable = unusable or (result.top in named and isinstance(result.error, DocumentError))
                 shown.add(result)
                 for report in reports:
                     report.add(result)
@@ -76,7 +82,8 @@ def run_sync(args: argparse.Namespace) -> int:
             shown.close(ended)
     for trouble in filter(None, (report.trouble for report in reports)):
         print(f"silo-mod: {trouble}", file=sys.stderr)
-    return summary.exit_code or int(any(report.trouble for report in reports))
+    code = summary.exit_code or int(any(report.trouble for report in reports))
+    return max(code, Exit.BAD_INPUT) if unusable else code
 
 
 def _results(

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -32,7 +33,10 @@ _MARK = {
 
 def add_bom_diff(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "folders", metavar="FOLDER", nargs="*", help="OLD and NEW; with --git the one folder to compare"
+        "folders",
+        metavar="FOLDER",
+        nargs="*",
+        help="OLD and NEW, folders or files; with --git the one folder",
     )
     add_options(
         parser,
@@ -75,11 +79,14 @@ def run_bom_diff(args: argparse.Namespace) -> int:
 
 def _two_states(args: argparse.Namespace) -> tuple[FolderBoms, FolderBoms]:
     """Read the two states to compare. Raises InputError."""
-    from silo.vault.folder_boms import read_folder
+    from silo.vault.folder_boms import read_file, read_folder
 
     if args.git is None:
         if len(args.folders) != 2:
-            raise InputError("Name two folders, OLD and NEW, or two revisions with --git A..B.")
+            raise InputError("Name two folders or two files, OLD and NEW, or two revisions with --git A..B.")
+        if all(map(os.path.isfile, args.folders)):  # of one file, whatever its two states are called
+            first, second = args.folders
+            return read_file(first, os.path.basename(second)), read_file(second)
         return read_folder(args.folders[0]), read_folder(args.folders[1])
     if len(args.folders) > 1:
         raise InputError("With --git name at most one folder, the part of the repository to compare.")

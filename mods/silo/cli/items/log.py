@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from silo import spoken
 from silo.bom.errors import Exit, InputError, SiloError
 from silo.bom.proposed_command import proposed
-from silo.cli.connection import client_of
+from silo.cli.connection import client_of, named_item
 from silo.cli.json_output import print_json
 from silo.cli.options import add_each, add_options, only_with
 from silo.cli.progress import set_step
@@ -27,7 +27,7 @@ def add_log(parser: argparse.ArgumentParser) -> None:
         parser,
         "file",
         metavar="FILE",
-        help="a FreeCAD file that is registered; with --since a part number as well",
+        help="a FreeCAD file that is registered, or a part number",
     )
     points = {
         "--since POINT": "what changed in the product on all levels since then: a day such as 2026-02-08, "
@@ -53,14 +53,19 @@ def run_log(args: argparse.Namespace) -> int:
                 number = _item_of(client, args.file, _identity(args.file, path)).part_number
             _show_changes(args, client.get_changes(number, args.since, args.until or ""))
         return Exit.DONE
-    if not os.path.isfile(path):
-        raise InputError(f"{args.file} is not a file. Give the path of an FCStd file.")
-    identity = _identity(args.file, path)
+    is_file = os.path.isfile(path)
+    if not is_file and (os.path.isdir(path) or not _may_be_number(args.file)):
+        raise InputError(f"{args.file} is not a file. Give the path of an FCStd file, or a part number.")
+    if args.changes and not is_file:
+        raise InputError("--changes compares BOMs from the folder of a file; give the path of an FCStd file")
+    identity = _identity(args.file, path) if is_file else ""
     with client_of(args) as client:
-        item = _item_of(client, args.file, identity)
+        item = _item_of(client, args.file, identity) if is_file else named_item(client, args.file)
         revisions = client.revisions(item.part_number)
         shown = revisions[: args.limit]
-        here = _revision_on_disk(Store(), path, sha256_of(path), identity, client.base_url, revisions)
+        here: tuple[int | None, bool] = (None, False)
+        if is_file:
+            here = _revision_on_disk(Store(), path, sha256_of(path), identity, client.base_url, revisions)
         changes: dict[int, str] = {}
         if args.changes:
             files = file_revisions(revisions)
@@ -79,8 +84,13 @@ def run_log(args: argparse.Namespace) -> int:
     if args.json:
         print_json(_log_json(item.part_number, shown, here, changes, args.changes))
     else:
-        _show_log(item.part_number, item.name, shown, here, changes, len(revisions))
+        _show_log(item.part_number, item.name, shown, here if is_file else None, changes, len(revisions))
     return Exit.DONE
+
+
+def _may_be_number(text: str) -> bool:
+    """Return False for what is meant as a file, which is not there."""
+    return not text.lower().endswith(".fcstd") and os.sep not in text and text != "-"
 
 
 def _identity(name: str, path: str) -> str:
@@ -177,17 +187,18 @@ def _show_log(
     number: str,
     name: str,
     shown: list[Revision],
-    here: tuple[int | None, bool],
+    here: tuple[int | None, bool] | None,
     changes: dict[int, str],
     total: int,
 ) -> None:
+    """Print the revisions; ``here``: which one the file is, None if no file was named."""
     from rich.text import Text
 
     from silo.cli.terminal import console, plain
 
     out = console()
     out.print(Text(plain(f"{number}  {name}"), "bold"))
-    if here[0] is None:
+    if here is not None and here[0] is None:
         out.print("This file is no revision in Silo, and it is not known which one it was made from.")
     for revision in shown:
         stamp = revision.created_at.astimezone().strftime("%Y-%m-%d %H:%M") if revision.created_at else ""
@@ -196,7 +207,7 @@ def _show_log(
         text.append(plain(revision.comment) or spoken("(no comment)"))
         if not (revision.file_name or revision.file_checksum):
             text.append(spoken("  properties only"), "dim")
-        if revision.revision_number == here[0]:
+        if here is not None and revision.revision_number == here[0]:
             text.append(spoken("  ← this file, edited since" if here[1] else "  ← this file"), "green")
         out.print(text)
         if said := changes.get(revision.revision_number):

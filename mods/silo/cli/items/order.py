@@ -14,7 +14,7 @@ from silo import spoken
 from silo.bom.errors import Exit, counted
 from silo.cli.connection import client_of, named_item
 from silo.cli.json_output import print_json
-from silo.cli.options import above_zero, add_each, add_options, only_with
+from silo.cli.options import above_zero, add_each, add_old_name, add_options, only_with
 from silo.cli.outputs import add_outputs
 from silo.cli.terminal import console, plain, table_of
 from silo.output_files import csv_table, workbook
@@ -24,14 +24,12 @@ if TYPE_CHECKING:
 
 
 def add_order(parser: argparse.ArgumentParser) -> None:
-    add_each(
-        parser, "part_number", "--revision", "--csv", "--xlsx", metavar="PRODUCT", help="its part number"
-    )
+    add_each(parser, "part_number", "--release", "--csv", "--xlsx", metavar="PRODUCT", help="its part number")
     parser.add_argument("--quantity", metavar="N", type=above_zero, default=1, help="for so many pieces (1)")
     add_options(
         parser,
         {
-            "--revision REVISION": "of a released revision, such as B (else of the draft)",
+            "--release LABEL": "of a released revision, such as B (else of the draft)",
             "--spares PERCENT": "so many percent more of each part",
             "--rest": "without what was ordered already",
             "--supplier NAME": "only what this supplier sells",
@@ -41,6 +39,7 @@ def add_order(parser: argparse.ArgumentParser) -> None:
     add_outputs(parser, {"--csv FILE": "write a table as CSV (- for standard output)"}, csv_table(*headings))
     add_outputs(parser, {"--xlsx FILE": "write a table as a workbook"}, workbook(*headings))
     parser.set_defaults(to_standard_output=("--csv",))
+    add_old_name(parser, "--revision", "--release")
     kinds = ("bought", "made", "unsaid")
     parser.add_argument("--kind", choices=kinds, default="bought", help="only these parts (bought)")
     only_with(parser, "--csv --xlsx", "--kind", "--supplier")
@@ -50,7 +49,7 @@ def run_order(args: argparse.Namespace) -> int:
     """Print what to order, or write it as a table."""
     from silo.platform import replacing
 
-    asked = {"pieces": args.quantity, "spares": args.spares, "release": args.revision, "rest": args.rest}
+    asked = {"pieces": args.quantity, "spares": args.spares, "release": args.release, "rest": args.rest}
     given = {name: str(value) for name, value in asked.items() if value}
     table = {"kind": args.kind} | ({"supplier": args.supplier} if args.supplier else {})
     with client_of(args) as client:
@@ -97,4 +96,6 @@ def _print_order(order: OrderList) -> None:
         days = "not known" if order.lead_time_days is None else counted(order.lead_time_days, "day")
         cost, without = f"{order.total_cost} {order.currency}", counted(order.unpriced, "part")
         total = f"Cost: {cost}, without {without}" if order.unpriced else f"Cost: {cost}"
+        if order.unpriced >= len(order.parts):
+            total = "Cost: not priced"
         out.print(Text(spoken(f"{total}\nLongest lead time: {days}")))

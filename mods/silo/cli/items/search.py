@@ -11,8 +11,9 @@ from rich.text import Text
 
 from silo import spoken
 from silo.bom.errors import Exit
+from silo.bom.quantities import plain as plain_quantity
 from silo.cli.connection import client_of, named_item
-from silo.cli.json_output import print_json
+from silo.cli.json_output import print_json, print_json_list
 from silo.cli.options import add_each
 from silo.cli.terminal import console, plain
 
@@ -31,7 +32,7 @@ def run_search(args: argparse.Namespace) -> int:
         items = client.search_items(" ".join(args.words), limit=args.limit)
     rows = [{name: getattr(item, name) for name in ("part_number", "name", "item_type")} for item in items]
     if args.json:
-        print_json(rows)
+        print_json_list(rows)
     else:
         _print(rows or [{"part_number": spoken("No item has these words.")}])
     return Exit.DONE if rows else Exit.UNDONE
@@ -48,7 +49,7 @@ def run_show(args: argparse.Namespace) -> int:
         {
             "part_number": line.child_part_number,
             "name": line.child_name or line.child_description,
-            "quantity": line.quantity,
+            "quantity": plain_quantity(line.quantity),
             "source": line.source,
         }
         for line in lines

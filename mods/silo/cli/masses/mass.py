@@ -4,9 +4,12 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from silo.bom.errors import Exit
+from silo.bom.message import message
 from silo.cli.connection import client_of
 from silo.cli.masses.geometry import read_model
 from silo.cli.masses.options import (
@@ -27,6 +30,7 @@ from silo.cli.reading import read_tops
 
 if TYPE_CHECKING:
     from silo.bom.entry import BomEntry
+    from silo.inertia.assembly import Assembly
     from silo.inertia.report import InertiaReport
 
 
@@ -76,9 +80,21 @@ def run_mass(args: argparse.Namespace) -> int:
     if not assembly.instances:
         words = "the document holds no part with a shape: there is nothing to weigh"
         report.add_warning("", "", words, GeometryCode.NO_GEOMETRY)
+    weightless = bool(assembly.instances) and report.total is not None and report.total.mass == 0
+    if weightless:
+        print(f"silo-mod: {_weightless(assembly)}", file=sys.stderr)
     show_report(args, report, assembly)
     pushed = _push(args, report) if args.push else 0
-    return max(pushed, verdict(args, report))
+    return max(pushed, verdict(args, report), Exit.UNDONE if weightless else Exit.DONE)
+
+
+def _weightless(assembly: Assembly) -> str:
+    """Say why the whole weighs nothing, and what to do."""
+    return message(
+        "{name} weighs 0 kg here, since no part has a material with a density. Give the materials in "
+        "FreeCAD, or a BOM with --bom, or --default-density 1000 for a first number",
+        name=assembly.name or "assembly",
+    )
 
 
 def _push(args: argparse.Namespace, report: InertiaReport) -> int:

@@ -13,7 +13,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from silo.bom.errors import ConfigError, InputError
+from silo.bom.errors import ConfigError, InputError, did_you_mean
+from silo.bom.message import message
 from silo.cli.options import add_options, job_count, only_with
 from silo.cli.outputs import add_preview
 
@@ -146,8 +147,21 @@ def material_table(args: argparse.Namespace) -> MaterialTable:
 
 def check_options(args: argparse.Namespace, *, asks_server: bool) -> None:
     """Report bad numbers, scenes and a missing server before minutes of reading, not after."""
+    from silo.inertia.bom.table import BomCode
+    from silo.inertia.codes import MassCode
+    from silo.inertia.geometry.options import MESH_UNITS
     from silo.inertia.materials.densities import checked_density
+    from silo.inertia.notes import GeometryCode
+    from silo.inertia.rigid import TensorProblem
 
+    known = [str(code) for codes in (MassCode, GeometryCode, BomCode, TensorProblem) for code in codes]
+    for code in args.allow:
+        if code not in known:
+            unknown = message("--allow: there is no warning {code}", code=code)
+            raise InputError(f"{unknown}{did_you_mean(code, known)}")
+    if args.mesh_unit is not None and args.mesh_unit not in MESH_UNITS:
+        text = "--mesh-unit: wanted one of {known}, got {unit}"
+        raise InputError(message(text, known=", ".join(MESH_UNITS), unit=args.mesh_unit))
     if args.default_density is not None:
         checked_density(args.default_density)
     if not (args.timeout >= 0 and math.isfinite(args.timeout)):

@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 
 from silo.bom.errors import Exit
-from silo.cli.json_output import print_json
+from silo.cli.json_output import print_json, print_json_list
 
 
 def add_schema(parser: argparse.ArgumentParser) -> None:
@@ -20,7 +20,7 @@ def run_schema(args: argparse.Namespace) -> int:
     if args.name is not None:
         print_json(schema_of(args.name))
     elif args.json:
-        print_json(NAMES)
+        print_json_list(NAMES)
     else:
         print("\n".join(NAMES))
     return Exit.DONE

@@ -13,7 +13,7 @@ from dataclasses import asdict
 
 from silo import spoken
 from silo.bom.errors import ConfigError, Exit
-from silo.cli.options import a_path, add_options, not_with
+from silo.cli.options import a_path, add_old_name, add_options, not_with
 
 
 def add_serve(parser: argparse.ArgumentParser) -> None:
@@ -65,12 +65,14 @@ def add_restore(parser: argparse.ArgumentParser) -> None:
     add_options(
         parser,
         {
-            "--replace": "replace a database that has items; they are lost",
-            "--verify": "only check that the backup is whole; change nothing",
+            "--replace-database": "replace a database that has items; they are lost",
+            "--dry-run": "only check that the backup is whole; change nothing",
         },
     )
     _add_place(parser)
-    not_with(parser, "--verify", "--replace", "--database", "--files")
+    add_old_name(parser, "--replace", "--replace-database")
+    add_old_name(parser, "--verify", "--dry-run")
+    not_with(parser, "--dry-run", "--replace-database", "--database", "--files")
 
 
 def add_summaries(parser: argparse.ArgumentParser) -> None:
@@ -124,17 +126,17 @@ def run_backup(args: argparse.Namespace) -> int:
 
 
 def run_restore(args: argparse.Namespace) -> int:
-    """Replace the server's state by a backup, or with ``--verify`` only check that the backup is whole."""
+    """Replace the server's state by a backup, or with ``--dry-run`` only check that the backup is whole."""
     need_server_extra()
     from silo_server.backup import restore, verify
     from silo_server.settings import settings_from_environment
 
-    if args.verify:
+    if args.dry_run:
         made = verify(args.source)
         text = f"The backup of {made.made_at} is whole: {sum(made.rows.values())} rows, {made.files} files."
     else:
         settings = settings_from_environment(database_url=args.database, files_dir=args.files)
-        made = restore(settings, args.source, replace=args.replace, report=_report)
+        made = restore(settings, args.source, replace=args.replace_database, report=_report)
         text = f"Restored the backup of {made.made_at}: {sum(made.rows.values())} rows, {made.files} files."
     print(json.dumps(asdict(made)) if args.json else spoken(text))
     return Exit.DONE
