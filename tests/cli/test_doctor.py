@@ -7,10 +7,12 @@ import json
 import os
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from silo.cli.main import main
+from silo.platform import cache_folder, config_folder, data_folder
 
 FREECAD = """#!{python}
 import json, os
@@ -78,12 +80,12 @@ def test_the_add_on_and_its_packages(
     data = freecad(tmp_path, monkeypatch)
     found = seen(capsys)
     assert found["FreeCAD"] == f"{os.environ['SILO_FREECADCMD']}: 1.1, Python 3.13"
-    assert found["add-on"] == f"not in {data / 'Mod' / 'silo-mod'}: silo-mod install-addon puts it there"
+    assert found["add-on"] == f"not in {data / 'Mod' / 'silo-mod'}: `silo-mod install-addon` puts it there"
     (data / "Mod" / "silo-mod").mkdir(parents=True)
     assert seen(capsys)["add-on"] == str(data / "Mod" / "silo-mod")
     freecad(tmp_path, monkeypatch, {"pydantic": "ImportError: it is for another Python"})
     assert seen(capsys)["add-on"].endswith(
-        "without pydantic (ImportError: it is for another Python): silo-mod install-addon installs it"
+        "without pydantic (ImportError: it is for another Python): `silo-mod install-addon` installs it"
     )
 
 
@@ -116,3 +118,22 @@ def test_another_distribution_with_our_import_name_is_named(
     (info / "top_level.txt").write_text("silo\n")
     monkeypatch.syspath_prepend(tmp_path)
     assert "silo also has a package named silo" in seen(capsys)["silo-mod"]
+
+
+def test_clean_deletes_what_is_remembered_and_no_more(run: Any, gearbox: Path) -> None:
+    """The next run reads the files afresh. Commits that wait and the configuration stay, also where the same
+    folder has all of it, as on Windows.
+    """
+    assert run("bom", gearbox.parent).code == 0
+    assert any(cache_folder().rglob("*"))
+    kept = [data_folder() / "outbox.sqlite3", config_folder() / "config.toml"]
+    kept += [cache_folder() / "outbox.sqlite3", cache_folder() / "revisions" / "A" / "Top.FCStd"]
+    for path in kept:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+    done = run("doctor", "--clean")
+    assert (done.code, "deleted" in done.out) == (0, True)
+    assert not list(cache_folder().glob("documents.sqlite3*"))
+    assert all(path.is_file() for path in kept)
+    assert run("bom", gearbox.parent).code == 0
+    assert run("doctor", "--clean").code == 0

@@ -116,6 +116,12 @@ def test_ctrl_d_is_an_answer() -> None:
         text=True,
     ) as child:
         os.close(inside)
+        assert child.stderr is not None
+        asked = ""
+        while "API token of" not in asked or not asked.endswith("): "):
+            letter = child.stderr.read(1)
+            assert letter, asked
+            asked += letter
         os.write(terminal, b"\x04")
         _out, told = child.communicate(timeout=120)
         os.close(terminal)

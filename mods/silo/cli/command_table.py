@@ -129,7 +129,7 @@ THEMES = {
         "whoami": ("setup.login", "show which server is meant, and as whom", "silo-mod whoami"),
         "doctor": (
             "setup.doctor",
-            "show what is where on this machine, which server is meant, and what fails; changes nothing",
+            "show what is where on this machine, which server is meant, and what fails",
             "silo-mod doctor",
         ),
     },

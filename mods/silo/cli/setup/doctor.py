@@ -7,14 +7,16 @@ import argparse
 import importlib.metadata
 import importlib.util
 import os
+import shutil
 import sys
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from silo import spoken
-from silo.bom.errors import ConfigError, Exit, ForbiddenError, NotFoundError, SiloError, exit_of
+from silo.bom.errors import ConfigError, Exit, ForbiddenError, NotFoundError, SiloError, counted, exit_of
 from silo.cli.connection import client_of
 from silo.cli.json_output import print_json
+from silo.cli.options import add_options
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
@@ -31,8 +33,35 @@ Rows = dict[str, "str | SiloError"]
 T = TypeVar("T")
 
 
+def add_doctor(parser: argparse.ArgumentParser) -> None:
+    text = "delete what is remembered of files and servers (the cache); commits and the configuration stay"
+    add_options(parser, {"--clean": text})
+
+
+# What can be made again, by its name in the cache. On Windows the same folder holds commits that wait; old
+# revisions that were opened may have edits; locks are in use.
+_CACHED = ("documents.sqlite3*", "geometry", "servers.json", "unreferenced.json")
+
+
+def _clean() -> str:
+    """Delete what is remembered in the cache, and return how much it was."""
+    from silo.platform import cache_folder
+
+    folder = cache_folder()
+    found = [path for name in _CACHED for path in folder.glob(name)]
+    files = [file for path in found for file in (path, *path.rglob("*")) if file.is_file()]
+    size = sum(file.stat().st_size for file in files)
+    for path in found:
+        shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
+    return f"{folder}: {counted(len(files), 'file')} deleted, {size / 1e6:.1f} MB"
+
+
 def run_doctor(args: argparse.Namespace) -> int:
     """Print what was found; returns 2 or 3 if something that the commands need does not work."""
+    if args.clean:
+        text = _clean()
+        print_json({"ok": True, "cache": text}) if args.json else print(spoken(text))
+        return Exit.DONE
     checks = {**_machine(), **_server(args)}
     failed = {name: value for name, value in checks.items() if isinstance(value, SiloError)}
     if args.json:
