@@ -96,6 +96,6 @@ def _print_order(order: OrderList) -> None:
         days = "not known" if order.lead_time_days is None else counted(order.lead_time_days, "day")
         cost, without = f"{order.total_cost} {order.currency}", counted(order.unpriced, "part")
         total = f"Cost: {cost}, without {without}" if order.unpriced else f"Cost: {cost}"
-        if order.unpriced >= len(order.parts):
+        if not any(part.cost for part in order.parts):
             total = "Cost: not priced"
         out.print(Text(spoken(f"{total}\nLongest lead time: {days}")))
