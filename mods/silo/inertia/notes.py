@@ -35,6 +35,7 @@ class GeometryCode(StrEnum):
     UNITS = "units"  # the unit was not stated, or is implausible
     SCALED = "scaled"  # a placement that scales
     BAKED = "baked"  # geometry far away from its own origin
+    MATERIAL = "material"  # the material that a part states cannot be found or read
     NAME = "name"  # lost characters, an unnamed product named by climbing
     READER = "reader"  # what the kernel complained about while reading
 

@@ -105,9 +105,7 @@ def run_inertia(args: argparse.Namespace) -> int:
     if not args.urdf and is_urdf(args.assembly):
         args.urdf = args.assembly
     if (args.urdf_out or args.in_place) and not args.urdf:
-        raise InputError(
-            "--urdf-out and --in-place do nothing without --urdf, or a URDF as ASSEMBLY"
-        )
+        raise InputError("--urdf-out and --in-place do nothing without --urdf, or a URDF as ASSEMBLY")
     if args.urdf_out and args.in_place:
         raise InputError("--urdf-out and --in-place name two places for one URDF; give one of them")
     if args.snippet and args.json:

@@ -632,7 +632,7 @@ def _prototype(walk: Walk, key: str, measured_part: Measured | str) -> Prototype
     return measured.prototype(
         key,
         walk.nodes[key].name,
-        *([Note("material", stated.problem)] if stated.problem else []),
+        *([Note(GeometryCode.MATERIAL, stated.problem)] if stated.problem else []),
         *([checks.lost_note(leaf.lost)] if leaf.lost else []),
         empty=Note(GeometryCode.NOT_READ, broken) if broken else None,
         step_density=stated.density,
