@@ -331,7 +331,8 @@ String should have at most {n} characters|String should have at least {n} charac
 """
 # What no person reads as it stands, and what has a catalogue of its own.
 _WITHOUT = re.compile(
-    r"silo/(workbench/(gui|pane|preview|register|smoke|headless|settings/preferences)|drawing/page|"
+    r"silo/(workbench/(activity|gui|pane|preview|register|revisions/dock|smoke|headless|settings/preferences)|"
+    r"drawing/page|bom/units\.py|tables/heading_detail\.py|fcstd/values\.py|"
     r"testing\.py|cli/json_schemas\.py|bom/headers\.py|bom/walk/standard\.py|api/wire\.py|"
     r"fcstd/properties\.py)|silo_server/services/product/(frozen|export|export_files)\.py"
 )
@@ -354,7 +355,7 @@ _NO_TEXT = re.compile(
             r"\(\?|\\(?! )|signal \(SIG|^(?=\w+[A-Z])[A-Z]\w+( [A-Z]\w+)*$|\w::\w|sys; print|\w \| \w",
             r"Mapping\[|UUIDs|^1 to 64 char|Client\(|module \{|^\{typeid\} \{name\} of|^\{meta_key\}",
             # tables of words in files, link maps, fields, values for programmers
-            r"(^|; )\w+; \w+;|^grs; |netto|pièce|einzeln|^(no value|not (set|specified)|nicht |kein )",
+            r"^(lfd nr|item no)|Link,Part,Part|(^|; )\w+; \w+;|^grs; |netto|pièce|einzeln|^(no value|not (set|specified)|nicht |kein )",
             r"^(aucune|sans|sin|nessun) |^name part_number|^(BomTable|MassProps|InertiaReport)\(|import main",
             r"Link map for|Each line is a part|^as your robot|anything within|silo-mod (links|inertia) FILE",
             r"Links of the URDF that|parts: \[\]|^STEP, FCStd|\}  #|^rule decided|material <|grs; ",
@@ -420,7 +421,7 @@ def _other_texts(tree: ast.Module, path: Path) -> Iterator[ast.AST]:
                 yield node
             case ast.Call(func=ast.Attribute(value=ast.Name("logger")) | ast.Attribute(attr="_gauge")):
                 yield node
-    if path.parent.name == "routes":
+    if "routes" in path.parts:
         inside = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
         yield from (node for node in tree.body if not isinstance(node, inside))
         yield from (node.args for node in ast.walk(tree) if isinstance(node, ast.FunctionDef))
