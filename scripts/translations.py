@@ -341,7 +341,8 @@ _NO_TEXT = re.compile(
     "|".join(
         (
             # SQL
-            r"\b(SELECT|INSERT|DELETE FROM|UPDATE|PRAGMA|CREATE|REPLACE INTO|VALUES|PRIMARY|NOT NULL|NULL)\b",
+            r"\b(SELECT|INSERT|DELETE FROM|UPDATE|PRAGMA|CREATE|ALTER TABLE|REPLACE INTO|VALUES|PRIMARY)\b",
+            r"\b(NOT NULL|NULL)\b",
             r"\b(INTEGER|REAL|ORDER BY|LISTEN|LOCK TABLE|SET LOCAL)\b|\{select\}|= \?|^[a-z_]+(, [a-z_]+)+$",
             r"^status (=|IN) |jit=|^number name$|^(merge|import) \{|^upload document$|^send \{force",
             r"sys\.path|^Server\(|^Silo: relink|^True: no part|^Identity of the item",
@@ -355,7 +356,8 @@ _NO_TEXT = re.compile(
             r"\(\?|\\(?! )|signal \(SIG|^(?=\w+[A-Z])[A-Z]\w+( [A-Z]\w+)*$|\w::\w|sys; print|\w \| \w",
             r"Mapping\[|UUIDs|^1 to 64 char|Client\(|module \{|^\{typeid\} \{name\} of|^\{meta_key\}",
             # tables of words in files, link maps, fields, values for programmers
-            r"^(lfd nr|item no)|Link,Part,Part|(^|; )\w+; \w+;|^grs; |netto|pièce|einzeln|^(no value|not (set|specified)|nicht |kein )",
+            r"^(lfd nr|item no)|Link,Part,Part",
+            r"(^|; )\w+; \w+;|^grs; |netto|pièce|einzeln|^(no value|not (set|specified)|nicht |kein )",
             r"^(aucune|sans|sin|nessun) |^name part_number|^(BomTable|MassProps|InertiaReport)\(|import main",
             r"Link map for|Each line is a part|^as your robot|anything within|silo-mod (links|inertia) FILE",
             r"Links of the URDF that|parts: \[\]|^STEP, FCStd|\}  #|^rule decided|material <|grs; ",
