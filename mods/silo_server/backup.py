@@ -45,7 +45,7 @@ from silo.bom.errors import ConfigError, SiloError, listed
 from silo.platform import replace_patiently, replacing, scratch_folder, sync_folder
 from silo_server.actors import SYSTEM
 from silo_server.db.database import Database
-from silo_server.db.migrate import check_revision, upgrade
+from silo_server.db.migrate import STEPS, check_revision, upgrade
 from silo_server.db.rows import insert_rows, one_of
 from silo_server.db.state import mode_of, put_state
 from silo_server.db.tables import (
@@ -136,6 +136,34 @@ def back_up(settings: Settings, target: Path, report: Report = lambda _: None) -
     except OSError as error:
         raise ConfigError(f"backup: {target} cannot be written: {error.strerror or error}") from error
     return made
+
+
+def back_up_before_upgrade(db: Database) -> Path | None:
+    """Write a backup if the database holds data and steps of its schema are missing; return the folder.
+
+    A step may change or sort what is there, so the state before it can be restored by the older version.
+    Raises ConfigError if the backup cannot be written: then nothing is changed.
+    """
+    with db.read() as tx:
+        if not inspect(tx.conn).has_table("alembic_version"):
+            return None
+        schema = tx.conn.scalar(text("SELECT version_num FROM alembic_version"))
+        if schema is None or schema == max(STEPS):
+            return None
+        check_revision(str(schema))
+        if not tx.conn.scalar(text("SELECT count(*) FROM users")):
+            return None
+    folder = db.settings.storage.with_name(f"{db.settings.storage.name}-before-upgrade")
+    target = folder / f"{schema}-{utc_now():%Y%m%dT%H%M%S%f}"
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        back_up(db.settings, target)
+    except (OSError, ConfigError) as error:
+        raise ConfigError(
+            f"the database has the schema {schema}, and a backup is made before it is changed; nothing was "
+            f"changed, for {error}. Make room in {folder}, then start again"
+        ) from error
+    return target
 
 
 def verify(source: Path) -> Manifest:

@@ -37,6 +37,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from silo.bom.errors import ConfigError
 from silo.platform import WORKERS_CAN_SHARE_A_SOCKET, allow_many_files, own_the_port, scratch_folder
 from silo_server.actors import Role
+from silo_server.backup import back_up_before_upgrade
 from silo_server.db.database import WRITERS_WAITING, Database
 from silo_server.db.migrate import upgrade
 from silo_server.db.tables import events, users
@@ -89,7 +90,10 @@ def prepare(db: Database, token: str | None = None, *, reset_admin: str | None =
         the user with this name becomes an active admin, is made if there is none, and is let in: the way
         back for people who locked themselves out.
     """
+    saved = back_up_before_upgrade(db)
     left = upgrade(db)
+    if saved is not None:
+        left.append(f"The database was brought up to date. The state before it is in {saved}.")
     with db.write(even_when_read_only=True) as tx:
         tx.lock(MIGRATION_LOCK)  # of two servers that start at once, one makes the first admin
         if tx.conn.scalar(select(func.count()).select_from(users)) == 0:

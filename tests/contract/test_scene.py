@@ -362,7 +362,7 @@ def test_hostile_models_are_refused_with_a_sentence(api: Api, part: str) -> None
     content = upload(api, api.item())
     for name, value in (GEOMETRIES if part == "geometry" else STRUCTURES).items():
         answer = put(api, content, part, value if isinstance(value, bytes) else json.dumps(value).encode())
-        assert answer.status == 400, name
+        assert answer.status == (413 if name == "JSON that nests" else 400), name
         assert answer.json()["message"].startswith(f"{part}: "), name
     many = structure(A={"uses": [use("A")] * 50_001}, B={"uses": [use("A")] * 50_000})
     for bad, status in {

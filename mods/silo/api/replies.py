@@ -41,9 +41,14 @@ from silo.bom.errors import (
 )
 from silo.bom.numbers import whole_number
 from silo.bom.proposed_command import proposed
+from silo.bounded_json import read_json
+from silo.budget import Budget, OverBudgetError
 
 Model = TypeVar("Model", bound=BaseModel)
 
+# The largest BOM that is asked for at once has 200 000 lines of some twenty values; a hostile server can
+# write thirty times as many containers into as many bytes.
+ANSWER = Budget(bytes=1 << 30, objects=1_000_000, cells=8_000_000, depth=1000, text=1 << 30)
 _MAX_TEXT = 400
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069]+")
 _TITLE = re.compile(r"<title[^>]*>(.{1,200}?)</title>", re.IGNORECASE | re.DOTALL)
@@ -102,7 +107,10 @@ class Reply:
                 "check that the address is that of a Silo server"
             )
         with translated(self.where):
-            return json.loads(self.content)
+            try:
+                return read_json(self.content, ANSWER, self.where.asked)
+            except OverBudgetError as error:
+                raise ServerFaultError(str(error)) from None
 
     def mapping(self, accept: Sequence[int] = ()) -> dict[str, Any]:
         """Read the answer as a JSON object; a bad status that is not in ``accept`` raises the error of
@@ -162,8 +170,8 @@ def complaint(reply: Reply) -> Complaint:
     if reply.is_html:
         return Complaint(text=_clean(_titled(reply).strip(" ()"), reply.secret))
     try:
-        body = json.loads(reply.content)
-    except (ValueError, RecursionError):
+        body = read_json(reply.content, ANSWER, reply.where.asked)
+    except (ValueError, OverBudgetError):
         return Complaint(text=_clean(reply.content[: 8 * _MAX_TEXT].decode("utf-8", "replace"), reply.secret))
     if not isinstance(body, dict):
         return Complaint(text=_clean(body, reply.secret))

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -75,6 +75,7 @@ class Hub:
         self.head = EventMark(0)
         self.epoch = 0  # counts how often the log turned out to be another one
         self.listeners = 0
+        self.streams: Counter[tuple[int | None, str]] = Counter()  # of a user at an address
         self.closed = False
         self.beats = 0
         self._news = asyncio.Event()

@@ -6,9 +6,10 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Sequence
 
-from starlette.responses import Response
+from starlette.responses import JSONResponse, Response
 from starlette.types import Receive, Scope, Send
 
+from silo.bom.errors import BusyError
 from silo_server.events.hub import Batch, Frame, Hub
 from silo_server.events.log import EventMark
 
@@ -18,6 +19,10 @@ HEADERS = {
 }
 
 HEARTBEAT = b"event: heartbeat\ndata: {}\n\n"
+
+
+# A user's tabs and programs on one machine; each stream holds a connection.
+MOST_STREAMS = 50
 
 
 class EventResponse(Response):
@@ -35,15 +40,33 @@ class EventResponse(Response):
         last: EventMark | None,
         items: Sequence[str] = (),
         still_allowed: Callable[[], bool] = lambda: True,
+        caller: tuple[int | None, str] = (None, ""),
     ) -> None:
         super().__init__(headers=HEADERS)
         del self.headers["content-length"]
         self._hub = hub
         self._last = last
         self._still_allowed = still_allowed
+        self._caller = caller
         self._items = frozenset(item.casefold() for item in items)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        streams = self._hub.streams
+        if streams[self._caller] >= MOST_STREAMS:
+            full = f"there are {MOST_STREAMS} event streams of this user at this address; close one"
+            await JSONResponse({"error": BusyError.code, "message": full}, 503, {"Retry-After": "30"})(
+                scope, receive, send
+            )
+            return
+        streams[self._caller] += 1
+        try:
+            await self._stream(receive, send)
+        finally:
+            streams[self._caller] -= 1
+            if not streams[self._caller]:
+                del streams[self._caller]
+
+    async def _stream(self, receive: Receive, send: Send) -> None:
         await send({"type": "http.response.start", "status": 200, "headers": self.raw_headers})
         gone = asyncio.ensure_future(_disconnected(receive))
         stream = asyncio.ensure_future(self._run(send))

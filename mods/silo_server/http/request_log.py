@@ -15,6 +15,7 @@ import secrets
 import sys
 import time
 from dataclasses import dataclass
+from urllib.parse import urlsplit, urlunsplit
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -72,7 +73,9 @@ class Observed:
                 status = message["status"]
                 headers = MutableHeaders(scope=message)
                 headers[HEADER] = info.id
-                target = headers.get("location", "")
+                target = _own_path(headers.get("location", ""))
+                if target:
+                    headers["location"] = target
                 if self._root and target.startswith("/") and not target.startswith("//"):
                     headers["location"] = self._root + target
             await send(message)
@@ -113,6 +116,14 @@ class Observed:
                 ensure_ascii=False,
             )
         )
+
+
+def _own_path(target: str) -> str:
+    """Make a redirect a path. All lead to this server, by an address that the caller's Host header chose."""
+    parts = urlsplit(target)
+    if not parts.netloc:
+        return target
+    return urlunsplit(("", "", "/" + parts.path.lstrip("/"), parts.query, parts.fragment))
 
 
 def log_to_stderr(settings: Settings) -> None:

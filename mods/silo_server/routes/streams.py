@@ -45,7 +45,8 @@ async def stream_events(
         except SQLAlchemyError:
             return True  # a lost database is no reason to end the streams
 
-    return EventResponse(call.server.hub, last, item or (), still_allowed)
+    caller = (call.actor.user_id, call.actor.address)
+    return EventResponse(call.server.hub, last, item or (), still_allowed, caller)
 
 
 def _event_id(text: str | None) -> log.EventMark | None:

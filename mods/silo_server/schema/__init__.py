@@ -21,6 +21,7 @@ from silo.bom.errors import ConfigError, InputError, NotFoundError, RejectedErro
 from silo.bom.items.schema import CategoryRule
 from silo.bom.numbers import read_number
 from silo.bom.quantities import plain
+from silo_server.web_address import address_problem
 
 DEFAULT_SCHEMA = "kindred-rd"
 _log = logging.getLogger(__name__)
@@ -72,8 +73,8 @@ class PropertyField:
         if self.pattern and not re.fullmatch(self.pattern, text):
             example = f" such as {self.example}" if self.example else ""
             raise RejectedError(f"{self.label}: wanted a value{example}, got {text!r}")
-        if self.type == "link" and not re.fullmatch(r"https?://[^\s/]\S*+", text):
-            raise RejectedError(f"{self.label}: wanted a web address (https://…), got {text!r}")
+        if self.type == "link" and (problem := address_problem(text)):
+            raise RejectedError(f"{self.label}: {problem}")
         return text
 
     def _number(self, text: str) -> int | float:

@@ -18,12 +18,14 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 from sqlalchemy import insert, select, update
 
 from silo.api import wire
 from silo.bom.errors import NotFoundError, RejectedError
 from silo.bom.text import character_problem
+from silo.bounded_json import read_json
+from silo.budget import Budget
 from silo.file_kind import MODEL
 from silo_server.db.rows import one_of
 from silo_server.db.tables import document_items, documents, models, revisions
@@ -38,6 +40,8 @@ from silo_server.values import Item
 
 Part = Literal["geometry", "structure"]
 UNPACKED = {"geometry": 64 * MIB, "structure": 32 * MIB}
+STRUCTURE = Budget(bytes=32 * MIB, objects=400_000, cells=4_000_000, depth=64, text=1000)
+GLB = Budget(bytes=64 * MIB, objects=700_000, cells=4_000_000, depth=64, text=1000)
 MAX_USES = 100_000
 # Assemblies count as well.
 MAX_OCCURRENCES = 50_000
@@ -144,9 +148,12 @@ def stored(tx: Tx, checksum: str, part: Part) -> str:
 def check_structure(body: bytes) -> wire.Structure:
     """Read and check the structure of a file. Raises RejectedError."""
     try:
-        structure = wire.Structure.model_validate_json(body)
+        data = read_json(body, STRUCTURE, "structure")
+        structure = wire.Structure.model_validate(data)
     except (ValidationError, ValueError) as error:
         raise RejectedError(f"structure: {_first(error)}") from error
+    if unknown := _unknown_key(data, structure):
+        raise RejectedError(f"structure: {unknown[:200]} is no key of a structure")
     uses = [use for product in structure.products.values() for use in product.uses]
     if len(uses) > MAX_USES:
         raise RejectedError(f"structure: wanted at most {MAX_USES} uses, got {len(uses)}")
@@ -169,6 +176,28 @@ def check_structure(body: bytes) -> wire.Structure:
     if lost:
         raise RejectedError(f"structure: wanted a product for each key, got none for {lost[0]!r}")
     return structure
+
+
+def _unknown_key(data: Any, known: BaseModel) -> str:
+    """Find a key that was sent and is not in the model; "" if there is none.
+
+    What is stored is handed out again as it came. So nothing is in it that was not checked.
+    """
+    stack: list[tuple[str, Any, Any]] = [("", data, known)]
+    while stack:
+        where, sent, model = stack.pop()
+        if isinstance(model, BaseModel) and isinstance(sent, Mapping):
+            fields = {info.alias or name: name for name, info in type(model).model_fields.items()}
+            fields |= {name: name for name in type(model).model_fields}
+            for key, value in sent.items():
+                if key not in fields:
+                    return f"{where}{key}"
+                stack.append((f"{where}{key}.", value, getattr(model, fields[key])))
+        elif isinstance(model, Mapping) and isinstance(sent, Mapping):
+            stack.extend((f"{where}{key}.", value, model.get(key)) for key, value in sent.items())
+        elif isinstance(model, list) and isinstance(sent, list):
+            stack.extend((f"{where}{i}.", *pair) for i, pair in enumerate(zip(sent, model, strict=True)))
+    return ""
 
 
 def _first(error: Exception) -> str:
@@ -198,11 +227,42 @@ _KEYS = {"asset", "scene", "scenes", "nodes", "meshes", "materials", "accessors"
 _KEYS |= {"extensionsUsed", "extensionsRequired"}
 
 
+# The keys of each kind of row, beside those that a writer may leave out.
+_ROWS = {
+    "asset": {"version", "generator"},
+    "scenes": {"nodes", "name"},
+    "nodes": {"mesh", "name", "extras", "children", "translation", "rotation", "scale", "matrix"},
+    "meshes": {"primitives", "name"},
+    "materials": {"pbrMetallicRoughness", "name", "alphaMode", "doubleSided"},
+    "accessors": {
+        *("bufferView", "byteOffset", "componentType", "count", "type", "min", "max", "normalized", "name"),
+        "sparse",
+    },
+    "bufferViews": {"buffer", "byteOffset", "byteLength", "byteStride", "target", "name"},
+    "buffers": {"byteLength", "uri", "name"},
+}
+
+
+def _unknown_parts(document: Mapping[str, Any]) -> Iterable[str]:
+    """Name keys of rows that a drawn model does not have: what a browser would build is what was checked."""
+    for kind, known in _ROWS.items():
+        rows = document.get(kind, ())
+        for row in [rows] if isinstance(rows, Mapping) else rows:
+            yield from (f"{kind}.{key}" for key in set(row) - known)
+    for mesh in document.get("meshes", ()):
+        for primitive in mesh["primitives"]:
+            drawn = {"attributes", "indices", "material", "mode"}
+            yield from (f"primitives.{key}" for key in set(primitive) - drawn)
+            yield from (f"attributes.{key}" for key in set(primitive["attributes"]) - {"POSITION", "NORMAL"})
+
+
 def _glb_problem(body: bytes) -> str:
     magic, version, length, size, kind = struct.unpack_from("<4sIII4s", body)
     if (magic, version, length, kind) != (b"glTF", 2, len(body), b"JSON") or size > length - 20:
         return "wanted a GLB of version 2 and of its own length, got another"
-    document = json.loads(body[20 : 20 + size], parse_constant=lambda name: float("nan"))
+    document = read_json(body[20 : 20 + size], GLB, "geometry", lambda name: float("nan"))
+    if unknown := next((place for place in _unknown_parts(document)), ""):
+        return f"wanted nodes, meshes and materials only, got {unknown[:60]!r}"
     rest = body[20 + size :]
     blob = memoryview(rest)[8:]
     if rest and (struct.unpack_from("<I4s", rest) != (len(blob), b"BIN\0")):

@@ -43,6 +43,7 @@ from silo_server.services.product.parts import DEFAULT_CURRENCY, RolledItem, cur
 from silo_server.services.search import index_item
 from silo_server.user_json import dumps
 from silo_server.values import Item
+from silo_server.web_address import address_problem
 
 # The columns of the table in which people edit supplier parts, paste them and import them.
 COLUMNS: Mapping[str, str] = {
@@ -60,7 +61,7 @@ EXAMPLES = {"prices": "1: 0.50; 100: 0.40", "link": "https://…"}
 _RATES = "currency_rates"
 _CODE = re.compile("[A-Z]{3}")
 MOST_PARTS, MOST_PRICES = 50, 30
-_LONGEST = {"supplier": 200, "number": 200, "link": 2000}
+_LONGEST = {"supplier": 200, "number": 200}
 LARGEST_AMOUNT, LARGEST_PRICE = Decimal(10) ** 9, Decimal(10) ** 12
 LONGEST_LEAD_TIME = 3650
 
@@ -266,8 +267,8 @@ class _Reader:
                 problem = f"wanted at most {longest} characters, got {len(row[name])}"
             if problem:
                 problems.append(f"{COLUMNS[name]}: {problem}")
-        if row["link"] and not re.fullmatch(r"https?://[^\s/]\S*+", row["link"]):
-            problems.append(f"Link: wanted a web address (https://…), got {row['link'][:40]!r}")
+        if row["link"] and (problem := address_problem(row["link"])):
+            problems.append(f"Link: {problem}")
         prices: dict[Decimal, Decimal] = {}
         for written in filter(None, map(str.strip, re.split("[;\n]", row["prices"]))):
             least, colon, price = written.rpartition(":")
