@@ -547,7 +547,7 @@ class RunSummary:
         command = f"; {proposed('register', Path(self.base))} gives them one" if self.base else ""
         return [f"{_examples(counted(len(lines), 'part'), lines)}{command}"]
 
-    def _by_cause(self, sentences: Iterable[str]) -> list[Cause]:
+    def _by_cause(self, sentences: Iterable[str]) -> list[FaultCause]:
         """Put sentences of one cause together, and those about one file at fault below it.
 
         A file that cannot be read itself is the cause of what its assemblies say of it.
@@ -558,11 +558,11 @@ class RunSummary:
             file = self.at_fault.get(words, words)
             cause = self.unreadable.get(file) or self.causes.get(words, words)
             groups.setdefault(cause, {}).setdefault(file, []).append(lines[words])
-        return [Cause(cause, files) for cause, files in groups.items()]
+        return [FaultCause(cause, files) for cause, files in groups.items()]
 
 
 @dataclass(frozen=True)
-class Cause:
+class FaultCause:
     """What several sentences of a run have in common; ``files``: file at fault → its sentences."""
 
     words: str
@@ -573,7 +573,7 @@ _EXAMPLES = 3
 _MOST_CAUSES = 12
 
 
-def _first_ones(cause: Cause) -> str:
+def _first_ones(cause: FaultCause) -> str:
     """Write a cause in one line: its only sentence, or how many files are at fault, with three of them."""
     (first, *others), *more = cause.files.values()
     if not more:
@@ -585,7 +585,7 @@ def _more_places(others: Sequence[str]) -> str:
     return f" ({counted(len(others), 'more place')})" if others else ""
 
 
-def _whole(cause: Cause) -> tuple[str, list[str]]:
+def _whole(cause: FaultCause) -> tuple[str, list[str]]:
     """Write a cause as a line, and a line for each file at fault below it."""
     ways = [
         f"{first.replace(f': {cause.words}', '')}{_more_places(others)}"

@@ -4,7 +4,7 @@
 There is one record of a file. Pull writes it when a revision arrives here, the queue when a commit has
 arrived in Silo; a commit that waits changes no record. Window, command line, queue and pull read it.
 
-The records lie in the project's folder (:data:`PROJECT_FILE`), so that whoever shares, copies or synchronises
+The records lie in the project's folder (:data:`PROJECT_FILE`), so that each user who shares or copies
 the folder has the files and what they come from. Where that cannot be written, and for a file of no project,
 they are the user's own (:data:`OWN_RECORDS` in the user's data folder).
 """

@@ -18,7 +18,7 @@ from other_disk import other_disk
 from silo.bom.errors import DocumentError
 from silo.bom.walk.identity import document_identity, identity_of
 from silo.fcstd import check_stampable, open_document, stamp, unstamp
-from silo.fcstd.container import ContainerFile, FileState
+from silo.fcstd.container import ContainerFile, FileStat
 from silo.fcstd.edit import replace_file
 from silo.fcstd.limits import Limits
 from silo.fcstd.repack import replaced_entry
@@ -202,7 +202,7 @@ def test_read_only_folders_stay(tmp_path: Path) -> None:
         path.parent.chmod(0o755)
 
 
-def write(path: Path, state: FileState, content: bytes) -> None:
+def write(path: Path, state: FileStat, content: bytes) -> None:
     real = str(path)
     replace_file(real, state, [content], lambda copy: _read_back(real, copy, "SiloUUID", "u-1"))
 
@@ -210,7 +210,7 @@ def write(path: Path, state: FileState, content: bytes) -> None:
 def test_a_file_that_changed_meanwhile_is_left_alone(tmp_path: Path) -> None:
     """Whoever saved between our reading and our writing wins."""
     path = part().save(tmp_path / "p.FCStd")
-    state = FileState.of(path.stat())
+    state = FileStat.of(path.stat())
     content = part(uuid="u-1").bytes()
     other = part("saved by FreeCAD").bytes()
     path.write_bytes(other)
@@ -223,7 +223,7 @@ def test_a_file_that_changed_meanwhile_is_left_alone(tmp_path: Path) -> None:
 def test_a_copy_without_the_identity_is_thrown_away(tmp_path: Path) -> None:
     """The new file is read before it takes the place of the old one."""
     path = part().save(tmp_path / "p.FCStd")
-    state = FileState.of(path.stat())
+    state = FileStat.of(path.stat())
     for content, words in ((part().bytes(), "does not hold"), (part().bytes()[:-9], "cannot be read")):
         with pytest.raises(DocumentError, match=words):
             write(path, state, content)

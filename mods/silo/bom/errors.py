@@ -48,7 +48,7 @@ class Exit(IntEnum):
 
     DONE = 0
     UNDONE = 1  # something differs, was left out, is held or waits; the output says what
-    BAD_INPUT = 2  # an argument, a file or the configuration cannot be used, whoever notices it
+    BAD_INPUT = 2  # an argument, a file or the configuration cannot be used; also if the server notices
     REMOTE = 3  # no server, or no right
     CANCELLED = 130  # Ctrl-C, SIGINT or SIGTERM
 

@@ -47,7 +47,7 @@ _HIGHEST_RATIO = 1032
 _LONGEST_STEP = 1 << 24
 
 
-class FileState(NamedTuple):
+class FileStat(NamedTuple):
     """What identifies one state of a file without reading it."""
 
     device: int
@@ -56,12 +56,12 @@ class FileState(NamedTuple):
     modified_ns: int
 
     @classmethod
-    def of(cls, status: os.stat_result) -> FileState:
+    def of(cls, status: os.stat_result) -> FileStat:
         """Make a state from ``os.stat`` or ``os.fstat``."""
         return cls(status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
 
     @classmethod
-    def now(cls, path: str) -> FileState | None:
+    def now(cls, path: str) -> FileStat | None:
         """Read the present state of a file; None if it cannot be read."""
         try:
             return cls.of(os.stat(path))
@@ -124,7 +124,7 @@ class ContainerFile:
         self.limits = limits
         self._descriptor = _open(path)
         self._window, self._window_at = b"", 0
-        self.state, self.changed_ns = FileState(0, 0, 0, 0), 0
+        self.state, self.changed_ns = FileStat(0, 0, 0, 0), 0
         try:
             self.state = self._regular_file()
             self.directory = self._directory()
@@ -140,7 +140,7 @@ class ContainerFile:
 
     def changed(self) -> bool:
         """Return True if the file was written to since it was opened."""
-        return FileState.of(os.fstat(self._descriptor)) != self.state
+        return FileStat.of(os.fstat(self._descriptor)) != self.state
 
     def entry(self, name: bytes) -> ZipEntry | None:
         """Return the entry of this name; None if there is none. Raises FcstdError if there are two."""
@@ -193,13 +193,13 @@ class ContainerFile:
         if entry.packed > most:
             raise self._error(f"its {name} is too large: {entry.packed} bytes packed, at most {most}")
 
-    def _regular_file(self) -> FileState:
+    def _regular_file(self) -> FileStat:
         status = os.fstat(self._descriptor)
         if not stat.S_ISREG(status.st_mode):
             kind = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
             raise self._error(f"it is {kind}, not a FreeCAD document")
         self.changed_ns = status.st_ctime_ns
-        return FileState.of(status)
+        return FileStat.of(status)
 
     def _directory(self) -> Directory:
         size = self.state.size

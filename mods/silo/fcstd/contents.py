@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from silo.fcstd.container import DOCUMENT_XML, ContainerFile, Directory, FileState
+from silo.fcstd.container import DOCUMENT_XML, ContainerFile, Directory, FileStat
 from silo.fcstd.errors import FcstdError
 from silo.fcstd.facts import Remembered
 from silo.fcstd.limits import Limits
@@ -31,7 +31,7 @@ class Content:
 
     xml: XmlText
     directory: Directory
-    state: FileState
+    state: FileStat
     changed_ns: int
     read_ns: int
 

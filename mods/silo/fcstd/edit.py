@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable
 from typing import BinaryIO
 
 from silo.bom.errors import DocumentError
-from silo.fcstd.container import ContainerFile, FileState, ZipEntry, document_xml
+from silo.fcstd.container import ContainerFile, FileStat, ZipEntry, document_xml
 from silo.fcstd.errors import FcstdError
 from silo.fcstd.limits import Limits
 from silo.fcstd.repack import Piece
@@ -68,7 +68,7 @@ def edited_xml(container: ContainerFile, edit: Edit, limits: Limits) -> tuple[Zi
         raise FcstdError(container.path, f"its Document.xml {error}; nothing was written") from error
 
 
-def replace_file(path: str, state: FileState, content: Iterable[Piece], check: Callable[[str], None]) -> None:
+def replace_file(path: str, state: FileStat, content: Iterable[Piece], check: Callable[[str], None]) -> None:
     """Replace the file, which must still be in ``state``, in one step. Raises DocumentError.
 
     check
@@ -81,7 +81,7 @@ def replace_file(path: str, state: FileState, content: Iterable[Piece], check: C
         raise DocumentError(path, f"it cannot be written: {error.strerror or error}") from error
 
 
-def _write(path: str, state: FileState, content: Iterable[Piece], check: Callable[[str], None]) -> None:
+def _write(path: str, state: FileStat, content: Iterable[Piece], check: Callable[[str], None]) -> None:
     folder = os.path.dirname(path)
     descriptor, temporary = tempfile.mkstemp(prefix=".silo-", suffix=".tmp", dir=folder)
     try:
@@ -91,7 +91,7 @@ def _write(path: str, state: FileState, content: Iterable[Piece], check: Callabl
             copy_rights(path, temporary)
             os.fsync(file.fileno())
         check(temporary)
-        if FileState.now(path) != state:
+        if FileStat.now(path) != state:
             raise changed(path)
         patiently(lambda: swap(temporary, path))
     except BaseException:

@@ -13,7 +13,7 @@ class FcstdError(DocumentError):
     finding
         what a link to this file has: missing, unreadable, …
     state
-        the state of the file (``FileState``) that was tried, None where it could not be opened.
+        the state of the file (``FileStat``) that was tried, None where it could not be opened.
     """
 
     def __init__(

@@ -12,7 +12,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from silo.bom.walk.kinds import Kind
-from silo.fcstd.container import Directory, FileState
+from silo.fcstd.container import Directory, FileStat
 from silo.fcstd.errors import FcstdError
 from silo.fcstd.properties import Properties, Text, table_of
 from silo.fcstd.values import ABSENT
@@ -42,7 +42,7 @@ class FileFacts(NamedTuple):
     """
 
     digest: str
-    state: FileState
+    state: FileStat
     changed_ns: int
     read_ns: int
     document: tuple[Sequence[str], Mapping[str, Text], Mapping[str, str]]
@@ -102,7 +102,7 @@ class Remembered:
             file_facts.changed_ns,
             file_facts.read_ns,
         )
-        self.state = FileState(*file_facts.state)
+        self.state = FileStat(*file_facts.state)
         self._objects = dict(file_facts.objects)
         self._tables: dict[str, _DigestTable] = {}
         self.document: Properties = _DigestTable(self, "", "", *file_facts.document)

@@ -10,7 +10,7 @@ from pathlib import Path
 from silo.bom.errors import InputError
 from silo.bom.findings import FindingCode
 from silo.bom.walk.document import LinkProblem
-from silo.fcstd.container import FileState
+from silo.fcstd.container import FileStat
 from silo.fcstd.contents import FileContents
 from silo.fcstd.document import FcstdDocument
 from silo.fcstd.errors import FcstdError
@@ -162,7 +162,7 @@ class Library:
                 return FcstdDocument(self, location, self._contents.read(location.real))
             except FcstdError as error:
                 # FreeCAD may just be writing it; if not, the second reading gives the same as the first.
-                if error.state is None or error.state == FileState.now(location.real):
+                if error.state is None or error.state == FileStat.now(location.real):
                     raise
                 return FcstdDocument(self, location, self._contents.read(location.real))
         except FcstdError as error:

@@ -19,7 +19,7 @@ from silo.bom.errors import DocumentError
 from silo.bom.walk.document import own
 from silo.bom.walk.identity import META_KEY, meta_key, own_identity
 from silo.fcstd import expat_reader
-from silo.fcstd.container import ContainerFile, FileState, ZipEntry
+from silo.fcstd.container import ContainerFile, FileStat, ZipEntry
 from silo.fcstd.edit import changed, check_writable, edited_xml, in_attribute, replace_file
 from silo.fcstd.expat_reader import Malformed, Span, XmlElement
 from silo.fcstd.library import Library
@@ -140,7 +140,7 @@ def _check_identity(path: str, identity: str) -> None:
 
 def _present(
     path: str,
-    state: FileState,
+    state: FileStat,
     identity: str,
     object_name: str | None,
     replace: bool,

@@ -13,7 +13,7 @@ import os
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from silo.fcstd.container import FileState
+from silo.fcstd.container import FileStat
 from silo.fcstd.contents import Content
 from silo.fcstd.errors import FcstdError
 from silo.fcstd.facts import Remembered
@@ -54,7 +54,7 @@ class SeenFile(NamedTuple):
         if it has no state.
         """
         state = error.state
-        if not isinstance(state, FileState):
+        if not isinstance(state, FileStat):
             return None
         content = f"!{state.inode}:{state.size}:{state.modified_ns}:{error.reason}"
         return cls(content, state.inode, state.size, state.modified_ns, 0, 0)

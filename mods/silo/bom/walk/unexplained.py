@@ -118,7 +118,7 @@ def _used_by(tree: Tree, document: Any, names: Iterable[str], *, but_features: b
     """Return the names of the objects that others of the document show or take.
 
     but_features
-        True if what a cut or a fusion takes counts all the same, as links do.
+        True if what a cut or a fusion takes counts anyway, as links do.
     """
     kinds = _USERS - {Kind.LOCAL} if but_features else _USERS
     users = [obj for obj, _ in survey_of(document).of(kinds)]

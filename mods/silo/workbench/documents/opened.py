@@ -3,7 +3,7 @@
 
 A document observer. A file is known by its content, so it is hashed when FreeCAD opens it, by a worker; the
 stamp that is taken at once says later whether somebody else has replaced the file since. Each save is noted
-with the content before it, so that the queue knows what a file was made from, whoever committed it
+with the content before it, so that the queue knows what a file was made from, by any program
 (:meth:`silo.outbox.store.Store.origins`).
 """
 

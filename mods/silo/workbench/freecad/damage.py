@@ -30,7 +30,7 @@ def damage(path: str, name: str = "") -> FcstdError | None:
     """
     from silo.bom.findings import FindingCode
     from silo.fcstd import Library
-    from silo.fcstd.container import FileState
+    from silo.fcstd.container import FileStat
     from silo.fcstd.errors import FcstdError
     from silo.fcstd.expat_reader import Refused
     from silo.fcstd.limits import ANY_SIZE
@@ -38,7 +38,7 @@ def damage(path: str, name: str = "") -> FcstdError | None:
     if not path or not os.access(path, os.R_OK):
         return None
     try:
-        state = FileState.of(os.stat(path))
+        state = FileStat.of(os.stat(path))
         if _SOUND.get((path, name)) == state:
             return None
         with Library(limits=ANY_SIZE) as library:

@@ -47,12 +47,12 @@ def _is_ours(program: str) -> bool:
 def _of_unknown_types(doc: Any) -> dict[str, tuple[str, str]]:
     from silo.bom.errors import DocumentError
     from silo.fcstd import Library
-    from silo.fcstd.container import FileState
+    from silo.fcstd.container import FileStat
     from silo.fcstd.limits import ANY_SIZE
 
     path = doc.FileName
     try:
-        state = FileState.of(os.stat(path))
+        state = FileStat.of(os.stat(path))
         if (types_unknown := _UNKNOWN.get(path)) is not None and types_unknown[0] == state:
             return types_unknown[1]
         with Library(limits=ANY_SIZE) as library:
