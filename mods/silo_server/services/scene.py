@@ -261,14 +261,12 @@ def _glb_problem(body: bytes) -> str:
     if (magic, version, length, kind) != (b"glTF", 2, len(body), b"JSON") or size > length - 20:
         return "wanted a GLB of version 2 and of its own length, got another"
     document = read_json(body[20 : 20 + size], GLB, "geometry", lambda name: float("nan"))
-    if unknown := next((place for place in _unknown_parts(document)), ""):
-        return f"wanted nodes, meshes and materials only, got {unknown[:60]!r}"
     rest = body[20 + size :]
     blob = memoryview(rest)[8:]
     if rest and (struct.unpack_from("<I4s", rest) != (len(blob), b"BIN\0")):
         return "wanted one binary chunk behind the JSON, got another"
-    if unknown := set(document) - _KEYS:
-        return f"wanted nodes, meshes and materials only, got {sorted(unknown)[0][:40]!r}"
+    if unknown := sorted(set(document) - _KEYS) or sorted(_unknown_parts(document)):
+        return f"wanted nodes, meshes and materials only, got {unknown[0][:40]!r}"
     if set(document.get("extensionsUsed", ())) - {"KHR_mesh_quantization"}:
         return "wanted no extension but KHR_mesh_quantization"
     if any(buffer.get("uri") or buffer["byteLength"] > len(blob) for buffer in document.get("buffers", ())):
