@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import stat
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -122,3 +123,17 @@ def test_content_and_name_are_on_disk_in_this_order(tmp_path: Path, monkeypatch:
     with replacing(tmp_path / "file") as file:
         file.write(b"four")
     assert done == ["4 bytes", "name", *([] if sys.platform == "win32" else ["folder"])]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+def test_a_pipe_or_a_device_is_written_into_and_never_replaced(tmp_path: Path) -> None:
+    """As root, a report to /dev/null would else leave a file in its place, for all programs."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with ThreadPoolExecutor(1) as pool:
+        content = pool.submit(pipe.read_bytes)
+        with replacing(pipe) as file:
+            file.write(b"a report")
+        assert content.result(timeout=60) == b"a report"
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["pipe"]

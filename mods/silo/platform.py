@@ -502,9 +502,14 @@ def replacing(path: Path | str, *, mode: int | None = None) -> Iterator[BinaryIO
     """Write the new content of a file: at any moment ``path`` has all of the old content or all of the new.
 
     The new file can be read by its owner only, unless ``mode`` says otherwise. If writing fails or the block
-    raises, the old content stays, and no other file remains beside it. Raises OSError.
+    raises, the old content stays, and no other file remains beside it. A pipe or a device, such as /dev/null,
+    is written into and never replaced. Raises OSError.
     """
     target = Path(path)
+    if _is_special(target):
+        with open(target, "wb") as file:
+            yield file
+        return
     # Beside the target, so that the rename at the end stays within one file system.
     handle, temporary = tempfile.mkstemp(prefix=f".{target.name[:50]}.", suffix=".part", dir=target.parent)
     try:
@@ -520,6 +525,15 @@ def replacing(path: Path | str, *, mode: int | None = None) -> Iterator[BinaryIO
             remove_patiently(temporary)
         raise
     sync_folder(target.parent)
+
+
+def _is_special(path: Path) -> bool:
+    """Return True for a pipe, a device or a socket: what is there, and is neither a file nor a folder."""
+    try:
+        mode = path.stat().st_mode
+    except OSError:
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
 
 
 def read_memory(path: Path) -> dict[str, Any]:
