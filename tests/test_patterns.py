@@ -28,6 +28,7 @@ MADE = {
     "silo/api/config.py",
     "silo/bom/errors.py",
     "silo/bom/text.py",
+    "silo/bom/walk/references.py",
     "silo/cli/exchange/pull.py",
     "silo/fcstd/xmltext.py",
     "silo/inertia/links/patterns.py",

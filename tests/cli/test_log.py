@@ -78,12 +78,9 @@ def test_what_changed_in_the_product_since(run: Any, silo: Any, history: str, ge
     assert (ran.code, "nothing on any level" in ran.out) == (0, True)
     out = run("log", history, "--since", "2020-01-01").out
     assert all(child in out for child in lines)
-    for wrong, why, code in (
-        (("--until", "r1"), "--since", 2),
-        (("--since", "yesterday"), "wanted a date", 3),
-    ):
+    for wrong, why in ((("--until", "r1"), "--since"), (("--since", "yesterday"), "wanted a date")):
         ran = run("log", history, *wrong)
-        assert (ran.code, why in ran.err) == (code, True)
+        assert (ran.code, why in ran.err) == (2, True)
 
 
 def test_what_cannot_be_shown_is_an_error_with_a_reason(run: Any, silo: Any, gearbox: Path) -> None:
@@ -91,4 +88,4 @@ def test_what_cannot_be_shown_is_an_error_with_a_reason(run: Any, silo: Any, gea
     missing = run("log", gearbox.with_name("None.FCStd"))
     assert (missing.code, "is not a file. Give the path of an FCStd file" in missing.err) == (2, True)
     unregistered = run("log", gearbox)
-    assert (unregistered.code, "register it (silo-mod register)" in unregistered.err) == (2, True)
+    assert (unregistered.code, f"`silo-mod register {gearbox}`" in unregistered.err) == (2, True)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from model_file import model_file
 
 from silo.api.pause import Pause
 from silo.outbox.entry import Commit, State
@@ -31,7 +32,7 @@ def _queue(silo: Any, tmp_path: Path) -> Queue:
     for name, server in (("One", url), ("Two", url), ("Three", "http://old.example:80")):
         item = silo.client.create_item("kindred-rd", "M01", name)
         path = tmp_path / f"{name}.FCStd"
-        path.write_bytes(name.encode())
+        path.write_bytes(model_file(name.encode()))
         ids.append(store.add(Commit(str(path), 1000.0, name, item.id, file=path), server).id)
     store.update(ids[1], state=State.HELD, reason="413: [bold]too large")
     return Queue(store, url, ids)
@@ -84,11 +85,11 @@ def test_a_pause_is_said_once_and_ends_with_retry(
 def test_files_are_saved_and_commits_discarded(run: Any, queue: Queue, tmp_path: Path) -> None:
     """A discarded file is kept aside; nothing is done without a number."""
     assert run("queue", "save", queue.ids[0], "--into", tmp_path / "out").code == 1
-    assert (tmp_path / "out" / f"{queue.ids[0]}-One.FCStd").read_bytes() == b"One"
+    assert (tmp_path / "out" / f"{queue.ids[0]}-One.FCStd").read_bytes() == model_file(b"One")
     assert run("queue", "discard", queue.ids[0], queue.ids[1]).code == 1
     assert [entry.label for entry in queue.store.entries()] == ["Three"]
     kept = {path.read_bytes() for path in (queue.store.path.parent / "kept-aside").rglob("*.FCStd")}
-    assert kept == {b"One", b"Two"}
+    assert kept == {model_file(b"One"), model_file(b"Two")}
     for words, said in ((("discard",), "which commit?"), (("discard", 99), "no commit 99")):
         ran = run("queue", *words)
         assert (ran.code, said in ran.err) == (2, True)
