@@ -28,12 +28,12 @@ from typing import Any, BinaryIO, Protocol
 from xml.sax.saxutils import escape, quoteattr
 
 from silo.api.wire import SourceDocument
+from silo.bom.commands_in_text import outside_commands
 from silo.bom.consolidation import one_hint_each
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import DocumentError, Exit, InputError, RemoteError, SiloError, counted, listed
 from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.items.naming import display_name
-from silo.bom.proposed_command import outside_commands, proposed
 from silo.bom.view.diff_rows import diff_json, diff_rows
 from silo.bom.view.folders import base_folder, project_folder, shorten
 from silo.bom.view.tree_json import entry_json, finding_json
@@ -42,6 +42,7 @@ from silo.bom_sync.resolved import Resolved, assemblies, blocking, resolve
 from silo.bom_sync.steps import Outcome, Status, SyncApi, server_lines, sync_tree
 from silo.checksums import sha256_of
 from silo.platform import replacing
+from silo.proposed_command import proposed
 
 _FINE = (Status.MERGED, Status.UNCHANGED, Status.DRY_RUN)
 

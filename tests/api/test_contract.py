@@ -107,7 +107,7 @@ def test_the_fake_has_the_methods_of_the_client_with_the_same_arguments() -> Non
         }
 
     client, fake = methods(SiloClient), methods(FakeSilo)
-    # The fake has no connection, no pages, no orders, no pictures and no models.
+    # The fake has no connection, no pages, no orders, no pictures and no models, and reads no tables.
     own = {
         "begin_login",
         "close",
@@ -117,6 +117,9 @@ def test_the_fake_has_the_methods_of_the_client_with_the_same_arguments() -> Non
         "get_order",
         "get_order_table",
         "get_scene",
+        "import_bom",
+        "import_parts",
+        "import_prices",
         "modules",
         "thumbnail",
     }

@@ -18,8 +18,8 @@ from fcstd_writer import Doc, locals_
 from running_freecad import opened
 
 from silo.api.client import SiloClient
+from silo.bom.commands_in_text import commands_in
 from silo.bom.errors import BusyError
-from silo.bom.proposed_command import commands_in
 from silo.cli.setup.demo_edits import remove_from_assembly, set_element_count
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

@@ -15,10 +15,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from silo.bom.commands_in_text import commands_in, outside_commands
 from silo.bom.errors import Exit
-from silo.bom.proposed_command import commands_in, outside_commands, proposed
 from silo.bom.view.folders import shorten
 from silo.cli.main import main
+from silo.proposed_command import proposed
 
 # A name as people give them, and what shells do with such a name.
 FOLDER = "Robot arm; v2 $HOME 'new' `x`"

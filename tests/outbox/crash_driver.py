@@ -19,6 +19,7 @@ import time
 from pathlib import Path
 
 from fcstd_writer import Doc
+from model_file import model_file
 
 from silo.api.client import SiloClient
 from silo.api.policy import Retries
@@ -57,10 +58,10 @@ class Life:
         key = new_key()
         path = self.folder / "vault" / f"{name}.FCStd"
         new = path.with_name(f"{name}.{os.getpid()}.new")
-        new.write_bytes(f"{key} ".encode() * self.chance.randint(1, 20_000))
+        new.write_bytes(model_file(f"{key} ".encode() * self.chance.randint(1, 20_000)))
         new.replace(path)
         held = self.store.hold(str(path), key)
-        if held is None or not held.read_bytes().startswith(key.encode()):
+        if held is None or not held.read_bytes().startswith(model_file(key.encode())):
             return  # the other client has just saved this document
         extraction = None
         if name.startswith("Assembly"):

@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 from fault_proxy import FAULTS, Proxy, fault_proxy
 from hunting import LONG
+from model_file import model_file
 from real_silo import MIXTURES, MOODS, TOKEN, Item, Moods, mixed, real_silo
 from server_testing import sqlite_database
 
@@ -57,7 +58,7 @@ def test_one_item_in_trouble(tmp_path: Path, proxy: Proxy, client: SiloClient, n
     for label, item in items.items():
         for number in (1, 2):
             path = tmp_path / f"{label}.FCStd"
-            path.write_bytes(f"{label} {number}".encode() * 1000)
+            path.write_bytes(model_file(f"{label} {number}".encode() * 1000))
             head = BomEntry(str(path), silo_uuid=item.id, is_assembly=True)
             lines = (BomEntry("/v/Bolt.FCStd", silo_uuid=bolt.id, quantity=number),)
             store.add(
@@ -207,7 +208,7 @@ def test_a_clock_that_is_set_back_holds_nothing_up(tmp_path: Path, proxy: Proxy,
     proxy.fault = None
     item = client.create_item("kindred-rd", "M01", "Plate")
     path = tmp_path / "Plate.FCStd"
-    path.write_bytes(b"plate")
+    path.write_bytes(model_file(b"plate"))
     now = [2_000_000_000.0]
     store = Store(tmp_path / "outbox.sqlite3", clock=lambda: now[0])
     store.add(Commit(str(path), now[0], "Plate", item.id, file=path))
@@ -259,7 +260,7 @@ def test_a_disk_that_takes_nothing_is_reported_and_loses_nothing(
     folder = Path(tempfile.mkdtemp(prefix="silo-faults-"))
     try:
         document = folder / "Plate.FCStd"
-        document.write_bytes(b"x" * 3_000_000)
+        document.write_bytes(model_file(b"x" * 3_000_000))
         (folder / "data").mkdir()
         Store(folder / "data" / "outbox.sqlite3").entries()
         if os.getuid() == 0:
@@ -293,6 +294,6 @@ def test_a_disk_that_takes_nothing_is_reported_and_loses_nothing(
         send_all(store, client, force=True)
         assert store.entries() == ()
         revisions = client.revisions(item.part_number)
-        assert [r.file_size for r in revisions] == [3_000_000] * len(waiting)
+        assert [r.file_size for r in revisions] == [document.stat().st_size] * len(waiting)
     finally:
         shutil.rmtree(folder, ignore_errors=True)

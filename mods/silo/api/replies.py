@@ -40,9 +40,9 @@ from silo.bom.errors import (
     duration,
 )
 from silo.bom.numbers import whole_number
-from silo.bom.proposed_command import proposed
 from silo.bounded_json import read_json
 from silo.budget import Budget, OverBudgetError
+from silo.proposed_command import proposed
 
 Model = TypeVar("Model", bound=BaseModel)
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from silo.bom.proposed_command import proposed
+from silo.proposed_command import proposed
 
 # What decides which parts and which server the run is about. A token stays out of every message.
 _KEPT = ("--assembly", "--server", "--schema", "--no-hardware", "--even-if-open")

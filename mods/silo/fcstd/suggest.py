@@ -19,11 +19,11 @@ from pathlib import Path
 from silo.bom.entry import Extraction, walk_entries
 from silo.bom.errors import DocumentError
 from silo.bom.findings import Finding, FindingCode
-from silo.bom.proposed_command import proposed
 from silo.bom.walk.identity import identity_of
 from silo.fcstd.document import FcstdDocument
 from silo.fcstd.library import Library
 from silo.platform import folded
+from silo.proposed_command import proposed
 
 # A project has some hundreds of files; a home folder taken for one would have many more.
 _MOST_FILES = 2000

@@ -6,8 +6,8 @@ from __future__ import annotations
 import os.path
 from types import ModuleType
 
+from silo.bom.commands_in_text import outside_commands
 from silo.bom.entry import Extraction
-from silo.bom.proposed_command import outside_commands
 from silo.bom.walk.document import relative
 
 

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 from silo.bom.compare.bom_diff import BomDiff
 from silo.bom.errors import Exit
 from silo.bom.items.naming import display_name
-from silo.bom.proposed_command import proposed
 from silo.bom.view.diff_rows import diff_json
 from silo.bom.view.folders import base_folder
 from silo.bom.view.tree_json import finding_json
@@ -21,6 +20,7 @@ from silo.cli.connection import client_of, reach
 from silo.cli.json_output import print_json
 from silo.cli.options import add_top
 from silo.cli.reading import plan_of, read_tops
+from silo.proposed_command import proposed
 
 if TYPE_CHECKING:
     from silo.bom_sync.resolved import Resolved

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 from silo import spoken
 from silo.bom.errors import Exit, InputError, SiloError
-from silo.bom.proposed_command import proposed
 from silo.cli.connection import client_of, named_item
 from silo.cli.json_output import print_json
 from silo.cli.options import add_each, add_options, only_with
 from silo.cli.progress import set_step
+from silo.proposed_command import proposed
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
