@@ -339,6 +339,8 @@ class _SendRun:
             )
         number = str(user["part_number"])
         self.client.attach_file(number, self._copy(entry), entry.file_name, cancelled=self.cancelled)
+        # Such a Silo lists no revisions of it: the record alone keeps the next run from sending it again.
+        note_arrived(entry, Revision(revision_number=0, file_checksum=entry.sha256))
         self.store.arrived(entry, "file")
         text = f"This Silo keeps it as an attachment of {number}, without revisions"
         return Sent(replace(entry, remark=text), number)
