@@ -253,7 +253,7 @@ def test_an_old_state_is_not_brought_back_by_a_retry(outbox: Outbox, silo: FakeS
     outbox.put(silo.base_url, TOP, bom=bom(5))
     outbox.send(silo)
     assert [e.superseded for e in outbox.entries()] == [True, False]
-    with pytest.raises(ConflictError, match="a newer commit of it was sent"):
+    with pytest.raises(ConflictError, match=r"a newer commit was sent; this one would overwrite it"):
         outbox.retry(old.id)
     outbox.retry(early.id)
     assert [e.state for e in outbox.entries()] == [State.HELD, State.WAITING]
