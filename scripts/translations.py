@@ -407,10 +407,12 @@ def texts_of_sentences(path: Path) -> Iterator[tuple[str, str, Path]]:
 
 def _other_texts(tree: ast.Module, path: Path) -> Iterator[ast.AST]:
     """Yield what holds other texts: those of Qt, of gettext, of logs, of numbers for Prometheus, of the API's
-    description.
+    description; and the lines of a shell's script.
     """
     for node in ast.walk(tree):
         match node:
+            case ast.FunctionDef("_bash" | "_zsh" | "_fish") if path.name == "completion.py":
+                yield node
             case ast.FunctionDef() | ast.AsyncFunctionDef():
                 yield from node.decorator_list
             case ast.Call(
