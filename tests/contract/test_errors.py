@@ -68,7 +68,7 @@ def small(
     url, tmp_path = databases.new(kind), tmp_path_factory.mktemp("small")
     settings = Settings(
         database_url=url,
-        max_body_bytes=2000,
+        max_body_bytes=2048,
         max_file_bytes=100_000,
         max_merge_entries=5,
         max_expanded_rows=3,
@@ -88,7 +88,7 @@ def test_limits_are_413_and_say_what_they_are(small: RunningServer) -> None:
         big = b'{"name": "' + b"x" * 3000 + b'"}'
         error = api.bad(413, "POST", "/api/items", body=big, headers={"Content-Type": "application/json"})
         assert error["error"] == "too_large"
-        assert "MiB" in error["message"]
+        assert "(2 KiB)" in error["message"]
         api.forget_connection()
         body, headers = form_body({"file": ("a", b"x" * 99_000)})
         path = f"/api/items/{parent}/file"

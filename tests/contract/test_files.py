@@ -307,8 +307,8 @@ def test_whose_content_it_is_now(api: Api, tmp_path: Path) -> None:
     contents = {}
     for name, of, former in (("before", document, ""), ("after", item.part_number, str(document))):
         path = tmp_path / f"{name}.FCStd"
-        path.write_bytes(name.encode())
-        contents[name] = hashlib.sha256(name.encode()).hexdigest()
+        path.write_bytes(model_file(name.encode()))
+        contents[name] = hashlib.sha256(path.read_bytes()).hexdigest()
         silo.upload_file(of, path, origin=Origin(file_path="parts/Plate.FCStd", former=former))
     found = {one.sha256: one for one in silo.get_contents([*contents.values(), "0" * 64])}
     assert found.keys() == set(contents.values())

@@ -48,17 +48,19 @@ async def import_items(
         read = part_import.read_parts_table(data, call.server.settings.max_merge_entries)
         with call.read() if dry_run else call.write() as tx:
             plan = (part_import.plan_parts if dry_run else part_import.apply_parts)(tx, read, category)
-        counts = Counter(row.status for row in plan)
-        return json_answer(
-            {
-                "dry_run": dry_run,
-                "counts": {status: counts[status] for status in ("add", "change", "same", "skip", "error")},
-                "problems": [f"row {row.row}: {problem}" for row in plan for problem in row.problems],
-                "unused_columns": list(read.unused),
-                "notes": list(read.notes),
-                "rows": [_row_to_wire(row) for row in plan],
-            }
-        )
+            counts = Counter(row.status for row in plan)
+            return json_answer(
+                {
+                    "dry_run": dry_run,
+                    "counts": {
+                        status: counts[status] for status in ("add", "change", "same", "skip", "error")
+                    },
+                    "problems": [f"row {row.row}: {problem}" for row in plan for problem in row.problems],
+                    "unused_columns": list(read.unused),
+                    "notes": list(read.notes),
+                    "rows": [_row_to_wire(row) for row in plan],
+                }
+            )
 
     return await anyio.to_thread.run_sync(work)
 
