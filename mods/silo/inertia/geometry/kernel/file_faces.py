@@ -181,7 +181,8 @@ def spheres_of(face: Any, transfer: Any) -> Iterator[Sphere]:
         sphere = BRepAdaptor_Surface(bare, False).Sphere()
         surface = entity.FaceGeometry()
         factors = StepData_Factors()
-        factors.InitializeFactors(sphere.Radius() / surface.Radius(), 1.0, 1.0)
+        per_file_unit = sphere.Radius() / surface.Radius()
+        factors.InitializeFactors(per_file_unit, 1.0, 1.0)
         yield Sphere(
             bare,
             entity,
