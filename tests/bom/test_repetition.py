@@ -97,6 +97,18 @@ def test_a_feature_that_consumes_a_compound_consumes_its_hardware_only(top: Doc,
     assert counts(top.assembly(bundle, cut)) == {"Bolt": 1}
 
 
+def test_a_member_of_a_consumed_compound_is_used_up_with_it(top: Doc, bolt: Any) -> None:
+    """The compound counts no screw, so no finding says that it does; the linked part counts there."""
+    screw, link = top.screw("S"), top.link("L", bolt)
+    bundle = top.add("Part::Compound", "Bundle", Links=[screw, link])
+    cut = top.add("Part::Cut", "Cut", Base=top.body("Plate"), Tool=bundle)
+    found = extract(top.assembly(screw, link, bundle, cut))
+    assert {entry.object_name: entry.quantity for entry in found.entries} == {"Bolt": 1}
+    used_up = {place.obj for note in found.findings_of(FindingCode.CONSUMED) for place in note.where}
+    twice = {place.obj for note in found.findings_of(FindingCode.COINCIDENT) for place in note.where}
+    assert (used_up, twice) == ({"S", "Bundle"}, {"L"})
+
+
 def test_a_left_out_source_is_left_out_of_what_shows_it(top: Doc) -> None:
     """The source lies outside of the assembly, so only the compound leads to it."""
     bundle = top.add("Part::Compound", "B", Links=[top.screw("S", Suppressed=True), top.screw("T", "30")])

@@ -134,9 +134,9 @@ TRUTH: dict[str, Truth] = {
     "joints_and_sheets": _is({BOLT: 2}),  # a joint holds one of the two
     "sheets_sketches_datums": _is({BOLT: 1}),
     "copy_on_change": _is({BOLT: 1}, variant=("top.FCStd#Variant",)),
-    "draft_link_array": _is({BOLT: 6}, draft_array=("top.FCStd#Array",)),
+    "draft_link_array": _is({BOLT: 6}, draft_array=("top.FCStd#Array",), coincident=("top.FCStd#Original",)),
     "boolean_operands": _is({BOLT: 1}, local_geometry=("top.FCStd#Top",)),
-    "hidden_link": _is({BOLT: 2}, consolidated=(BOLT,)),
+    "hidden_link": _is({BOLT: 2}, consolidated=(BOLT,), hidden=("top.FCStd#Hidden",)),
     "mirrored_link": _is({BOLT: 2}, consolidated=(BOLT,), mirrored=("top.FCStd#Mirrored",)),
     "mirrored_array_element": _is({BOLT: 2}, mirrored=("top.FCStd#Row",)),
     "excluded_link": _is({BOLT: 1}, excluded=("top.FCStd#LeftOut",)),
@@ -172,7 +172,9 @@ TRUTH: dict[str, Truth] = {
     "hardware_linked_in_the_file": _is({SCREW: 10}),
     "hardware_source_outside": _is({BOLT: 1, SCREW: 3}),
     "hardware_in_draft_arrays": _is(
-        {SCREW: 6, "ISO 4762 M4×20": 4}, draft_array=("top.FCStd#Array", "top.FCStd#Array001")
+        {SCREW: 6, "ISO 4762 M4×20": 4},
+        draft_array=("top.FCStd#Array", "top.FCStd#Array001"),
+        coincident=("top.FCStd#First", "top.FCStd#Second"),
     ),
     "hardware_cloned": _is({SCREW: 2}),
     "hardware_in_a_fasteners_file": _is({SCREW: 5, "ISO 4032 M4": 1}),
@@ -186,7 +188,9 @@ TRUTH: dict[str, Truth] = {
     "hardware_copied_as_geometry": _is({BOLT: 1}, local_geometry=("top.FCStd#Top",)),
     "hardware_used_up": _is(
         {SCREW: 2},
-        consumed=("top.FCStd#Cutters", "top.FCStd#Operand", "top.FCStd#Tool"),
+        # A and B go with the compound that cuts; C and D count where the other compound shows them.
+        consumed=tuple(f"top.FCStd#{name}" for name in ("A", "B", "Cutters", "Operand", "Tool")),
+        coincident=("top.FCStd#C", "top.FCStd#D"),
         local_geometry=("top.FCStd#Top",),
     ),
     "hardware_tools": _is({BOLT: 1}),
@@ -197,10 +201,13 @@ TRUTH: dict[str, Truth] = {
     "declared_container": _is(
         {"top.FCStd#Module": (1, {BOLT: 2, SCREW: 1})}, uuids={"top.FCStd#Module": UUID_2}
     ),
-    "array_over_an_inline_part": _is({BOLT: 15}, draft_array=("top.FCStd#Array",)),
+    "array_over_an_inline_part": _is(
+        {BOLT: 15}, draft_array=("top.FCStd#Array",), coincident=("top.FCStd#Second",)
+    ),
     "draft_arrays_without_links": _is(
         {BOLT: 6, PLATE: 5, WASHER: 16},
         draft_array=("top.FCStd#Array", "top.FCStd#Array001", "top.FCStd#Array002"),
+        coincident=("top.FCStd#Base0", "top.FCStd#Base1", "top.FCStd#Base2"),
     ),
     "link_to_a_draft_array_elsewhere": _is(
         {"kit.FCStd#Array": (2, {BOLT: 6})}, draft_array=("kit.FCStd#Array",)

@@ -396,13 +396,19 @@ class Reading:
         return self._unconsumed(tree, name, node)
 
     def _report_covered(self, tree: Tree, name: Key, obj: Any) -> None:
-        """Say that a visible original lies where an array or a compound shows it."""
+        """Say that a visible original lies where an array or a compound shows it, or is used up with that."""
         if name not in self._covered or not tree.visible(name):
             return
-        for other, kind in tree.members.values():
-            if kind in REPEATERS and any(source is obj for source in sources(other)):
+        for key, (other, kind) in tree.members.items():
+            if kind not in REPEATERS or not any(source is obj for source in sources(other)):
+                continue
+            node = self._node(name, obj, kind_of(obj))
+            taker = self._consumer(tree, key)
+            if taker is None or node is None or self._outlasting(node):
                 self._notes.add(FindingCode.COINCIDENT, obj, target=other)
-                return
+            elif self._is_hardware(node):
+                self._notes.add(FindingCode.CONSUMED, obj, target=taker[0])
+            return
 
     def _is_reference(self, tree: Tree, name: Key, link: Any) -> bool:
         """Return True for a hidden link that only supports other geometry; the file may say otherwise."""
@@ -492,16 +498,19 @@ class Reading:
             return ObjectRole.COMPONENT, node  # a device that cut its place, hidden: asked about as such
         if self._is_hardware(node):
             self._notes.add(FindingCode.CONSUMED, node.obj, target=feature)
-        remaining = {
-            key: owner
-            for key, owner in node.brings.items()
-            if key[0] != STANDARD_PARTS and not (key[0] == self._path and self._is_own(owner[0]))
-        }
-        if not remaining:
+        if not (remaining := self._outlasting(node)):
             return ObjectRole.OPERAND, None
         return ObjectRole.COMPONENT, Contribution(
             name, node.obj, node.kind, remaining, node.shown_objects, node.tree
         )
+
+    def _outlasting(self, node: Contribution) -> CountedObjects:
+        """Return what no feature uses up: the parts of other files, and declared parts."""
+        return {
+            key: owner
+            for key, owner in node.brings.items()
+            if key[0] != STANDARD_PARTS and not (key[0] == self._path and self._is_own(owner[0]))
+        }
 
     @staticmethod
     def _is_hardware(node: Contribution) -> bool:
