@@ -128,7 +128,7 @@ def test_the_reference_has_all_that_there_is() -> None:
     assert "### `POST /api/items/{part_number}/bom/merge`" in pages["api"]
     linked = set(re.findall(r"\]\(#(\w+)\)", pages["api"]))
     assert linked <= {name.lower() for name in re.findall(r"^### (\w+)$", pages["api"], re.MULTILINE)}
-    assert "silo-mod sync . --report night.md" in pages["executed"]
+    assert "silo-mod sync vault/ --report night.html" in pages["executed"]
     assert "Not run: needs FreeCAD" in pages["executed"]
 
 
