@@ -153,7 +153,7 @@ def test_what_is_missing_is_a_line_of_every_export(api: Api) -> None:
 
 
 def test_an_export_with_gaps_can_be_imported_again(api: Api) -> None:
-    """Rows that say what is missing are no lines of the BOM."""
+    """Rows that say what is missing are no lines of the BOM: the answer says that each was left out."""
     top, part = api.items(2)
     merge(api, top, entries((part, 4, [])), left_out=[MISSING])
     for query in ("", "?semicolons=true"):
@@ -161,4 +161,9 @@ def test_an_export_with_gaps_can_be_imported_again(api: Api) -> None:
         assert data.decode("utf-8-sig").startswith(f"Incomplete: {top} incomplete: 1 missing")
         assert b"Cover" in data
         answer = api.good("POST", bom(top, "import"), body=data)
-        assert [(row["part_number"], row["status"]) for row in answer["rows"]] == [(part, "same")]
+        assert [(row["part_number"], row["status"]) for row in answer["rows"]] == [
+            (part, "same"),
+            ("", "skip"),
+        ]
+        assert answer["rows"][1]["why"]
+        assert list(api.quantities(top)) == [part]

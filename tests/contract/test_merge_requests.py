@@ -66,13 +66,15 @@ def test_all_bad_entries_are_reported_at_once_with_their_index(api: Api) -> None
 
 
 def test_a_body_that_is_no_merge_is_refused(api: Api) -> None:
-    """400 with what was wanted; Python's JSON would read NaN and Infinity."""
+    """400 with what was wanted; Python's JSON would read NaN and Infinity. 413 for what nests without end."""
     parent, a = api.items(2)
     entries = f'{{"entries": [{{"child_part_number": "{a}", "quantity": '
     numbers = [entries + word + "}]}" for word in ("NaN", "Infinity", "-Infinity")]
-    for text in ("", "[", "[]", "null", '{"entries": 1}', "{}", "\udce4", "[" * 100_000, *numbers):
+    for text in ("", "[", "[]", "null", '{"entries": 1}', "{}", "\udce4", *numbers):
         raw = text.encode("utf-8", "surrogateescape")
         assert "body" in api.bad(400, "POST", bom(parent, "merge"), body=raw)["message"], text[:90]
+    deep = b"[" * 100_000
+    assert "body: it is nested too deep" in api.bad(413, "POST", bom(parent, "merge"), body=deep)["message"]
     endless = f"{entries}1e999}}]}}".encode()
     assert "quantity" in api.bad(400, "POST", bom(parent, "merge"), body=endless)["message"]
     assert api.get(bom(parent)) == []

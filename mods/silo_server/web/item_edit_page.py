@@ -261,7 +261,8 @@ def shown_properties(item: Item) -> list[tuple[str, str, str]]:
         order = [name for name in order if name not in ("supplier", "supplier_part_number", "lead_time_days")]
     hinted = {name: text_hints(field) for name, field in TEXTS.items()}
     # The page has places of its own for choices and long texts.
-    plain_texts = [name for name, hints in hinted.items() if item.texts[name] and not hints]
+    apart = [name for name, hints in hinted.items() if "options" in hints or hints.get("long")]
+    plain_texts = [name for name in hinted if item.texts[name] and name not in apart]
     properties = [(_(LABELS[name]), item.texts[name] or "", "") for name in plain_texts]
     for name in order:
         property_field = fields.get(name)

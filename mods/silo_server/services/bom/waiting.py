@@ -147,12 +147,23 @@ def _units(tx: Tx) -> Counter[int]:
     of_lines = shown.where(
         text(f"bom_lines.{WITH_UNIT}"), line.unit != func.coalesce(func.nullif(row.unit, ""), PIECES.symbol)
     )
-    of_items = shown.where(text(f"items.{WITH_UNIT}"), line.unit.is_(None), line.source == "assembly")
     counts: Counter[int] = Counter()
-    for parent_id, unit, of_item, source in (*tx.conn.execute(of_lines), *tx.conn.execute(of_items)):
+    for parent_id, unit, of_item, source in tx.conn.execute(of_lines):
         counts[parent_id] += not line_unit(unit, of_item, from_cad=source == "assembly").converts_to(
             unit_of(of_item)
         )
+    # The items come first: in one statement SQLite would read all lines to find the few of these items.
+    with_unit = select(row.id, row.unit).where(text(f"items.{WITH_UNIT}"))
+    others = [
+        item_id
+        for item_id, unit in tx.conn.execute(with_unit)
+        if not line_unit(None, unit, from_cad=True).converts_to(unit_of(unit))
+    ]
+    if others:
+        of_items = select(line.parent_id, func.count()).where(
+            one_of(tx, line.child_id, others), line.unit.is_(None), line.source == "assembly"
+        )
+        counts.update({row[0]: row[1] for row in tx.conn.execute(of_items.group_by(line.parent_id))})
     return +counts
 
 
