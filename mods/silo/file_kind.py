@@ -31,11 +31,11 @@ _BY_START = (
     (re.compile(rb"%PDF-"), "drawing"),
     (re.compile(rb"AC10\d\d"), "drawing"),
     (re.compile(rb"AutoCAD Binary DXF"), "drawing"),
-    (re.compile(rb"(?: {0,3}999\r?\n[^\n]*\n)* {0,3}0\r?\nSECTION\r?\n"), "drawing"),
-    (re.compile(rb"\s*ISO-10303-21\s*;"), "step"),
+    (re.compile(rb"\A(?: {0,3}999\r?\n[^\n]*\n)* {0,3}0\r?\nSECTION\r?\n"), "drawing"),
+    (re.compile(rb"\A\s*+ISO-10303-21\s*;"), "step"),
     (re.compile(rb"\x89PNG\r\n\x1a\n|\xff\xd8\xff|GIF8[79]a|II\*\0|MM\0\*"), "picture"),
     (re.compile(rb"BM.{4}\0\0\0\0|RIFF.{4}WEBP", re.DOTALL), "picture"),
-    (re.compile(rb"\s*<.*<svg[\s>]|\s*<svg[\s>]", re.DOTALL), "picture"),
+    (re.compile(rb"\A\s*+<(?:svg[\s>]|.*<svg[\s>])", re.DOTALL), "picture"),
 )
 _HEAD = 4096
 _DOCUMENT = b"Document.xml"
