@@ -18,6 +18,7 @@ from silo.budget import Account, Budget, Limit, OverBudgetError
 
 # An open text ends with the bytes. So no text is read twice.
 _TEXT = re.compile(rb'"[^"\\]*+(?:\\.[^"\\]*+)*+"?', re.DOTALL)
+_EMPTY = re.compile(rb"[\[{][ \t\r\n]*+[\]}]")
 
 
 def read_json(
@@ -50,4 +51,6 @@ def count_json(data: bytes, account: Account) -> None:
 
 def _counts(data: bytes) -> tuple[int, int]:
     containers = data.count(b"{") + data.count(b"[")
-    return containers, containers + data.count(b",") + data.count(b":") + 1
+    # A value stands behind each comma and colon, first in each container that is not empty, and outermost.
+    empty = sum(1 for _ in _EMPTY.finditer(data))
+    return containers, containers - empty + data.count(b",") + data.count(b":") + 1
