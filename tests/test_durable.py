@@ -124,7 +124,7 @@ def test_content_and_name_are_on_disk_in_this_order(tmp_path: Path, monkeypatch:
     assert done == ["4 bytes", "name", *([] if sys.platform == "win32" else ["folder"])]
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+@pytest.mark.usefixtures("needs_pipes")
 def test_a_pipe_or_a_device_is_written_into_and_never_replaced(tmp_path: Path) -> None:
     """As root, a report to /dev/null would else leave a file in its place, for all programs."""
     pipe = tmp_path / "pipe"

@@ -220,7 +220,7 @@ def test_files_are_replaced_and_removed_patiently() -> None:
     """On Windows another program may have a file open for a moment, so nobody asks only once."""
     hasty = re.compile(r"\.unlink\(|os\.(?:replace|rename|remove|unlink)\(")
     # The lock's own file is held by us, and waits for nobody.
-    there = {ASKED_THERE, MODS / "silo" / "files.py"}
+    there = {ASKED_THERE, MODS / "silo" / "folder_lock.py"}
     found = [
         f"{path.relative_to(MODS)}:{number}: {line.strip()}"
         for path in MODS.rglob("*.py")

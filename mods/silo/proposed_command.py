@@ -13,9 +13,11 @@ import shlex
 import subprocess
 from pathlib import Path
 
+from silo.platform import WINDOWS
+
 
 def proposed(*words: str | Path) -> str:
     """Write the command of silo-mod in backticks; a word that is a ``Path`` is a file or folder."""
     texts = [os.path.abspath(word) if isinstance(word, Path) else word for word in words]
-    quoted = subprocess.list2cmdline(texts) if os.name == "nt" else shlex.join(texts)
+    quoted = subprocess.list2cmdline(texts) if WINDOWS else shlex.join(texts)
     return f"`silo-mod {quoted}`"

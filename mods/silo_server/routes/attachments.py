@@ -20,11 +20,12 @@ from silo_server.routes.answers import READ_ERRORS, WRITE_ERRORS, json_answer
 from silo_server.routes.call import Editor, Viewer
 from silo_server.routes.items import Uuid, checked_hash
 from silo_server.routes.models import AttachmentsOut, RequestBody, Short
+from silo_server.routes.requests import BoundedRoute
 from silo_server.services import attachments
 from silo_server.services.field_checks import sha256_or_none, text_problem
 from silo_server.services.items import get_item, normal_uuid
 
-router = APIRouter(prefix="/api", tags=["attachments"], responses=READ_ERRORS)
+router = APIRouter(route_class=BoundedRoute, prefix="/api", tags=["attachments"], responses=READ_ERRORS)
 
 _KINDS: openapi.Schema = {"type": "string", "enum": list(ATTACHMENT_KINDS)}
 _FORM: openapi.Schema = {
