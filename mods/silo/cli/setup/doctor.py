@@ -45,14 +45,14 @@ _CACHED = ("documents.sqlite3*", "geometry", "servers.json", "unreferenced.json"
 
 def _clean() -> str:
     """Delete what is remembered in the cache, and return how much it was."""
-    from silo.platform import cache_folder
+    from silo.platform import cache_folder, remove_patiently
 
     folder = cache_folder()
     found = [path for name in _CACHED for path in folder.glob(name)]
     files = [file for path in found for file in (path, *path.rglob("*")) if file.is_file()]
     size = sum(file.stat().st_size for file in files)
     for path in found:
-        shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
+        shutil.rmtree(path) if path.is_dir() else remove_patiently(path)
     return f"{folder}: {counted(len(files), 'file')} deleted, {size / 1e6:.1f} MB"
 
 
