@@ -137,7 +137,8 @@ def edited_state(before: LineState, changes: Mapping[str, Any], child_unit: str 
         the unit of the line's child, in which a line without a unit is, unless CAD counted it.
     """
     after = replace(before, **changes)
-    after = replace(after, unit=stored_unit(after.unit))
+    if "unit" in changes:  # what the user did not edit stays as it is written
+        after = replace(after, unit=stored_unit(after.unit))
     same_unit = means_the_same_unit(before, after.unit, child_unit)
     if "source" in changes:
         if after.source == "assembly":
