@@ -212,14 +212,14 @@ def test_a_moment_of_what_changed_is_what_the_document_says(api: Api, document: 
 
 
 def test_an_operation_that_refuses_what_has_the_right_form_says_why(api: Api, document: Any) -> None:
-    """The reason stands at the operation and at its 400; these ten and no others."""
+    """The reason stands at the operation and at its 400; these and no others."""
     told = {
         f"{method.upper()} {path}": operation
         for path, operations in document["paths"].items()
         for method, operation in operations.items()
         if REFUSED in operation
     }
-    expected = "file file geometry import import merge resolve structure suppliers thumbnail"
+    expected = "file file files geometry import import import merge resolve structure suppliers thumbnail"
     assert sorted(name.rpartition("/")[2] for name in told) == expected.split()
     for operation in told.values():
         assert operation[REFUSED] in operation["responses"]["400"]["description"]

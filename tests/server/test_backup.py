@@ -116,7 +116,7 @@ def test_what_was_saved_comes_back_on_the_other_database(
         assert api.get("/api/rates") == rates
         assert api.get(f"/api/items/{parent}/releases/A") == frozen
         assert api.call("GET", f"/api/items/{parent}/file").body == model_file(b"first")
-        assert api.call("GET", f"/api/documents/{BOTH}/file").body == b"of two parts"
+        assert api.call("GET", f"/api/documents/{BOTH}/file").body == model_file(b"of two parts")
         told = api.get(f"/api/documents/{BOTH}")
         assert (told["file_path"], [one["part_number"] for one in told["holds"]]) == (
             "parts/both.FCStd",
