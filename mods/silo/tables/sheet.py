@@ -339,14 +339,11 @@ def _near(tables: Iterable[tuple[str, Sequence[SheetRow]]], kind: TableKind) -> 
 def _no_header(text: Sequence[str], kind: TableKind) -> str:
     lines = [line.strip() for line in text if line.strip()][:3]
     needed = ", ".join(role.replace("_", " ").capitalize() for role in kind.needed)
-    wanted = (
-        f"a header line with {needed}" if needed else "a header line with a column of names or part numbers"
-    )
+    wanted = f"header line with {needed}" if needed else "header line with a column of names or part numbers"
     if not lines:
-        return f"the file is empty; wanted {wanted}, and rows"
+        return f"the file is empty; wanted a {wanted}, and rows"
     seen = "; ".join(f"“{line[:80]}”" for line in lines)
-    words = f"found no {wanted.removeprefix('a ')} among the first {limits.HEADER_WITHIN} lines. "
-    words += f"The file begins with {seen}"
+    words = f"found no {wanted} among the first {limits.HEADER_WITHIN} lines. The file begins with {seen}"
     if kind.any_name:
         words += ". Name the columns yourself, for example: --column name=Bauteil --column mass=Gewicht"
     return words
