@@ -33,6 +33,7 @@ from silo.registering.saved_file import on_disk
 from silo.testing import FakeSilo
 from silo_server.run import running_server
 
+GIVEN_COUNTS = (Path(__file__).resolve().parents[3] / "shared").resolve() / "cases" / "counts"
 CATEGORIES = {"A01": "Assembly", "F01": "Fastener, screw", "M01": "Machined part", "M06": "Machined frame"}
 
 
@@ -347,6 +348,45 @@ def test_a_folder_is_registered_as_a_whole(run: Any, silo: Any, gearbox: Path) -
     assert (done.code, len(done.json()["registered"])) == (0, 9)
     assert "1 file that no assembly uses" in run("register", vault, "--yes").err
     assert len(silo.client.search_items()) == 9
+
+
+@pytest.mark.parametrize(
+    ("name", "copy"),
+    [
+        ("sub/Drive.FCStd", "sub/Drive (conflicted copy).FCStd"),
+        ("sub/Drive.FCStd", "Drive.FCStd"),
+        ("TopAssembly.FCStd", "TopAssembly (conflicted copy).FCStd"),
+    ],
+)
+def test_of_equal_files_the_linked_one_gets_the_item(
+    run: Any, silo: Any, gearbox: Path, name: str, copy: str
+) -> None:
+    """The copy of a sync tool sorts before its original; of two that nothing links to it is no other."""
+    vault = gearbox.parent
+    if name != gearbox.name:
+        (vault / "sub").mkdir()
+        Doc().link("L", "../parts/Cover.FCStd", "Body").add(
+            "App::Part", "Sub", Type="Assembly", Group=locals_("L")
+        ).save(vault / name)
+        Doc().link("L", name, "Sub").add("App::Part", "Top", Type="Assembly", Group=locals_("L")).save(
+            vault / "Above.FCStd"
+        )
+    shutil.copy(vault / name, vault / copy)
+    done = run("register", vault, "--yes", "--json").json()
+    files = {row["doc_path"] for row in done["registered"]}
+    left = {row["doc_path"] for row in done["unregistered"]}
+    assert (name in files, copy in left) == (True, True), (files, left)
+
+
+@pytest.mark.skipif(not GIVEN_COUNTS.is_dir(), reason="the given files are not beside this checkout")
+def test_the_given_conflicted_copy_gets_no_item(run: Any, silo: Any, tmp_path: Path) -> None:
+    vault = tmp_path / "vault"
+    vault.mkdir()
+    for file in (GIVEN_COUNTS / "conflicted-copy").iterdir():
+        (vault / file.name).write_bytes(file.read_bytes())
+    done = run("register", vault, "--yes", "--json").json()
+    assert "SubOne.FCStd" in {row["doc_path"] for row in done["registered"]}
+    assert [row["doc_path"] for row in done["unregistered"]] == ["SubOne (conflicted copy).FCStd"]
 
 
 @pytest.mark.parametrize("damage", [b"PK\x03\x04 cut short", None])

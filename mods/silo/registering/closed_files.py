@@ -51,14 +51,19 @@ _NOWHERE = _Nowhere()
 def whole_folder(
     plan: Plan, reading: VaultReader, base: str, *, hardware: bool = True
 ) -> tuple[Extraction, frozenset[str]]:
-    """Read all components of a folder's assemblies, and the files that no assembly uses."""
+    """Read all components of a folder's assemblies, and the files that no assembly uses.
+
+    What no assembly links to has level 0.
+    """
     from silo.vault.questions import Question
 
     entries: dict[tuple[str, str], BomEntry] = {}
+    linked: set[tuple[str, str]] = set()
     findings: list[Finding] = []
     for node in (node for layer in plan.layers for node in layer):
         extraction = plan.extraction(node, reading)
         findings += extraction.findings
+        linked.update(entry.key for entry in extraction.entries)
         for entry in (*extraction.entries, extraction.assembly):
             entries.setdefault(entry.key, replace(entry, children=()))
     used = {entry.doc_path for entry in entries.values()}  # a standard part's key has no file
@@ -69,7 +74,8 @@ def whole_folder(
             entries.setdefault(head.key, replace(head, children=(), is_assembly=False))
     unused = frozenset(entry.doc_path for entry in entries.values()) - used
     head = BomEntry(base, object_name="", is_assembly=True, level=0)
-    return Extraction(head, tuple(entries.values()), tuple(dict.fromkeys(findings))), unused
+    everything = (replace(entry, level=int(key in linked)) for key, entry in entries.items())
+    return Extraction(head, tuple(everything), tuple(dict.fromkeys(findings))), unused
 
 
 def seen_on_disk(paths: Iterable[str], *, even_if_open: bool) -> dict[str, OpenedFile]:

@@ -109,6 +109,7 @@ def offer(
         _candidate(entry, seen, categories, crowded, learnt, numbers if entry in copies else {})
         for entry in (*resolved.unregistered, *copies)
     ]
+    candidates = _originals_first(candidates)
     candidates.sort(key=lambda candidate: candidate.entry.is_standard)
     candidates += _modelled(extraction, seen, categories) if own_file else []
     control.check()
@@ -129,6 +130,23 @@ def offer(
     )
     recent = tuple(code for code in learnt.recent if code in categories)
     return Offer(with_twins, categories, numbers_next, registered, unsearched, recent)
+
+
+def _originals_first(candidates: list[Candidate]) -> list[Candidate]:
+    """Put of equal files the linked one before the others, then the one with the shortest name; the first
+    gets the item. A sync tool's conflicted copy has a longer name, and nothing links to it.
+    """
+    equal: dict[str, list[int]] = {}
+    for place, candidate in enumerate(candidates):
+        if candidate.sha256:
+            equal.setdefault(candidate.sha256, []).append(place)
+    ordered = list(candidates)
+    for places in equal.values():
+        group = [candidates[place] for place in places]
+        group.sort(key=lambda one: (one.entry.level == 0, len(one.entry.doc_path), one.entry.doc_path))
+        for place, candidate in zip(places, group, strict=True):
+            ordered[place] = candidate
+    return ordered
 
 
 def _perhaps_copies(extraction: Extraction, numbers: Mapping[str, str], api: Any) -> tuple[BomEntry, ...]:
