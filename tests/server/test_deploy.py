@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from model_file import model_file
 from server_testing import Api, reserved_port, sqlite_database, wait_until
 
 from silo.cli.parser import build_parser
@@ -189,12 +190,12 @@ def _try_all(host: str, trust: ssl.SSLContext, server: RunningServer, stack: Exi
     assert call("POST", "/api/items", body, {**token, "Content-Type": "application/json"}).status == 201
     while not (line := events.readline()).startswith(b"event: item.created"):
         assert line, "the stream ended"
-    megabytes, block = 20, b"x" * 2**20
-    head = b'--b\r\nContent-Disposition: form-data; name="file"; filename="large.FCStd"\r\n\r\n'
+    megabytes, block, model = 20, b"x" * 2**20, model_file(b"")
+    head = b'--b\r\nContent-Disposition: form-data; name="file"; filename="large.FCStd"\r\n\r\n' + model
     parts = itertools.chain([head], itertools.repeat(block, megabytes), [b"\r\n--b--\r\n"])
     length = len(head) + megabytes * len(block) + len(b"\r\n--b--\r\n")
     form = {"Content-Type": "multipart/form-data; boundary=b", "Content-Length": str(length)}
     assert call("POST", "/api/items/N/file", parts, {**token, **form}).status == 201
     sent = call("GET", "/api/items/N/file")
     size = sum(len(part) for part in iter(lambda: sent.read(2**20), b""))
-    assert size == megabytes * len(block)
+    assert size == len(model) + megabytes * len(block)

@@ -152,7 +152,8 @@ def test_a_page_offers_nothing_that_its_reader_may_not_do(
     visitors: dict[str, Visitor], busy: dict[str, str]
 ) -> None:
     """No form and no button that changes anything is shown to a viewer, but for the own account."""
-    own = {"/logout", "/language", "/mine/follow", "/mine/seen", "/account/tokens", "/account/password"}
+    own = {"/logout", "/language", "/mine/follow", "/mine/seen"}
+    own |= {"/account/tokens", "/account/password", "/account/logout-everywhere"}
     # The form of a line is behind a link that only editors are given.
     for path in (path for path in PAGES if "edit=" not in path):
         page = visitors[VIEWER].get(path.format(**busy)).body.decode()

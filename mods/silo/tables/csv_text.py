@@ -32,7 +32,9 @@ def decodings(
             raise InputError(f"{source}: cannot be read as {encoding}: {error}") from error
         return
     if name := unicode_name(data):
-        yield name, data.decode(name, errors="replace")
+        # Bytes that are no text are kept in the name of a file, which only UTF-8 can; else they are marked.
+        kept = not code_pages and name.startswith("utf-8")
+        yield name, data.decode(name, errors="surrogateescape" if kept else "replace")
         return
     if not code_pages:
         yield "utf-8", data.decode("utf-8", "surrogateescape")
