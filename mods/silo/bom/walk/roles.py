@@ -41,6 +41,7 @@ from silo.bom.walk.contents import (
     ObjectRole,
     add,
 )
+from silo.bom.walk.covering import Covering
 from silo.bom.walk.document import (
     LinkProblem,
     derived,
@@ -154,8 +155,7 @@ class Reading:
         self._wholes: set[Key] = set()
         self._inside: set[Key] = set()
         self._shown: set[Key] = set()
-        self._covered: set[Key] = set()
-        self._gone: set[Key] = set()
+        self._covering = Covering(reader.key)
         self._roles: dict[Key, ObjectRole] = {}
         self._holds_components = False
         self._main: Tree | None = None
@@ -308,10 +308,8 @@ class Reading:
         for name, (obj, kind) in tree.members.items():
             if kind is Kind.LINK and has_elements:
                 self._inside.update(map(self._key, elements(obj)))
-            elif kind is Kind.COMPOUND or (kind is Kind.DRAFT_ARRAY and tree.times(name)):
-                # The first instance of an array is at the place of its original.
-                covered = self._covered if tree.times(name) else self._gone
-                covered.update(map(self._key, sources(obj)))
+            elif kind in REPEATERS:
+                self._covering.look_at(tree, name)
 
     def _find_guides(self, tree: Tree) -> None:
         """Find the wires and points along which arrays and sweeps go; they are no parts."""
@@ -370,11 +368,11 @@ class Reading:
         if name in self._inside:
             return ObjectRole.INSIDE, None
         # Few assemblies have anything covered or shown twice; to climb for each takes long in deep ones.
-        around = (name, *tree.around(name)) if self._covered or self._shown else ()
-        if not self._covered.isdisjoint(around):
+        around = (name, *tree.around(name)) if self._covering or self._shown else ()
+        if any(self._is_covered(tree, outer) for outer in around):
             self._report_covered(tree, name, obj)
             return ObjectRole.SOURCE, None
-        if name in self._gone:
+        if name in self._covering.gone:
             return ObjectRole.LEFT_OUT, None
         if not tree.times(name):
             if left_out_by(obj) and any(tree.times(holder) for holder in tree.holders[name]):
@@ -395,9 +393,22 @@ class Reading:
             return self._modified_here(tree, name, node)
         return self._unconsumed(tree, name, node)
 
+    def _is_covered(self, tree: Tree, name: Key) -> bool:
+        """Return True if an array or a compound shows an object in the object's own place."""
+
+        def shows(key: Key) -> bool:
+            repeater, _ = tree.members[key]
+            if is_said_to_count(repeater) or not self._reader.has_view(repeater.Document):
+                return True
+            inner = key if self._consumer(tree, key) is None else name
+            node = self._node(inner, *tree.members[inner])
+            return key not in self._shown and node is not None and bool(self._outlasting(node))
+
+        return self._covering.covers(tree, name, shows)
+
     def _report_covered(self, tree: Tree, name: Key, obj: Any) -> None:
         """Say that a visible original lies where an array or a compound shows it, or is used up with that."""
-        if name not in self._covered or not tree.visible(name):
+        if not self._is_covered(tree, name) or not tree.visible(name):
             return
         for key, (other, kind) in tree.members.items():
             if kind not in REPEATERS or not any(source is obj for source in sources(other)):
