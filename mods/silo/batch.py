@@ -8,7 +8,7 @@ read ourselves are one plan (:mod:`silo.vault.plan`).
 The report of a sync, as Markdown, HTML, JSON or JUnit XML: written as the run goes, whole at every moment.
 
 What changed is written when it has happened. At the end of the run the report gets its beginning: one line
-of counts, what is new since the run before, and what needs a person, grouped by its cause. If the run ends
+of counts, what is new since the run before, and what needs a user, grouped by its cause. If the run ends
 early, the report says so.
 """
 
@@ -284,7 +284,7 @@ _CHANGES = {
 
 
 def cell(text: str) -> str:
-    """Return foreign text as Markdown that only shows it: one line, no markup, and GitHub notifies nobody.
+    """Return foreign text as Markdown that only shows it: one line, no markup, and GitHub notifies no one.
 
     On GitHub ``@team`` and ``#12`` are links, escaped or not; a space without width separates them.
     """
@@ -427,7 +427,7 @@ class RunSummary:
             files.append(file)
 
     def told(self) -> dict[str, str]:
-        """Return everything that needs a person: the sentence by which the next run knows it → the report's
+        """Return everything that needs a user: the sentence by which the next run knows it → the report's
         line.
         """
         several = ((words, files) for lines in (self.errors, self.warnings) for words, files in lines.items())

@@ -29,7 +29,7 @@ def bare_checksum(checksum: str | None) -> str:
 
 
 def seen_as(number: int, checksum: str | None) -> str:
-    """Return a name for the file of a revision that a person saw. It includes the file's hash, if the server
+    """Return a name for the file of a revision that a user saw. It includes the file's hash, if the server
     knows that, because a restored server gives the same number to another file.
     """
     return f"{number} {bare_checksum(checksum)}".strip()

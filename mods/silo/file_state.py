@@ -30,16 +30,16 @@ class FileState(StrEnum):
     NEWER = "newer"  # in Silo, and not edited here
     BOTH = "both"  # edited here, and newer in Silo
     WAITING = "waiting"  # its commit is in the queue
-    HELD = "held"  # its commit is in the queue, and a person decides
+    HELD = "held"  # its commit is in the queue, and a user decides
     SET_BACK = "server set back"  # to an older state: the file is of a revision that the server has lost
     UNKNOWN = "unknown"  # of an item that this server does not have
 
 
 NOT_SENT = frozenset({FileState.NEWER, FileState.BOTH, FileState.SET_BACK, FileState.UNKNOWN, FileState.HELD})
-"""The states that a commit leaves out unless a person says otherwise."""
+"""The states that a commit leaves out unless a user says otherwise."""
 
 ON_TOP = frozenset({FileState.BOTH, FileState.SET_BACK})
-"""The states that are sent on top of what Silo has, at a person's word."""
+"""The states that are sent on top of what Silo has, at a user's word."""
 
 
 def known_number(
@@ -63,7 +63,7 @@ def stands(
     number
         the revision that a content is, for servers that keep no checksums.
     seen
-        the newest revision that a person has seen and decided about (:func:`silo.checksums.seen_as`).
+        the newest revision that a user has seen and decided about (:func:`silo.checksums.seen_as`).
     """
     found = standing(revisions, "", None, seen)
     for content in (*origins, sha256):
@@ -75,7 +75,7 @@ def stands(
 
 
 def is_seen(revision: Revision, seen: str) -> bool:
-    """Return True if a revision is the one that a person has seen and decided about."""
+    """Return True if a revision is the one that a user has seen and decided about."""
     return bool(seen) and seen == seen_as(revision.revision_number, revision.file_checksum)
 
 

@@ -47,7 +47,7 @@ def folder_lock(
             os.chmod(path, 0o666)  # the next one may be another user
         if not shows_locks(path):
             problem = "its disk shows locks to this computer alone"
-    except FileNotFoundError:  # no such folder: nobody else is in it
+    except FileNotFoundError:  # no such folder: no other program is in it
         yield problem
         return
     except OSError as error:
@@ -75,7 +75,7 @@ def folder_lock(
 
 
 def _remove(path: str) -> bool:
-    """Remove a file. Returns False if it stays; it holds no lock then, so nobody waits for it."""
+    """Remove a file. Returns False if it stays; it holds no lock then, so no program waits for it."""
     try:
         os.unlink(path)
     except FileNotFoundError:

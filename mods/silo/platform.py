@@ -231,7 +231,7 @@ def hold_lock(path: str | os.PathLike[str], *, shared: bool = False) -> BinaryIO
 
     shared
         others may hold the lock too, if they share it. Windows has no such lock, and needs none to guard an
-        open file, which nobody can delete there.
+        open file, which cannot be deleted there.
 
     Returns None if another process holds the lock. The lock ends with its process, however that ends. Raises
     OSError.

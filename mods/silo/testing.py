@@ -589,7 +589,7 @@ class FakeSilo(FakeStore):
             stored, before = self._stored(part_number), self._find_line(part_number, child)
             after = {**before, **given}
             if after["quantity"] != before["quantity"] or not counts_pieces(after.get("unit")):
-                # If a person sets quantity or unit, the line is theirs; a merge reports it as a conflict.
+                # If a user sets quantity or unit, the line is theirs; a merge reports it as a conflict.
                 after |= {"source": "manual", "unreferenced_since": None}
             lines = [after if line is before else line for line in stored.lines]
             self._write(stored, lines, "bom.updated", {"item": stored.item.part_number})

@@ -290,7 +290,7 @@ def _replace_rows(reader: Connection, tx: Tx, made: Manifest, report: Report) ->
         tx.conn.execute(target.delete())
     for target in metadata.sorted_tables:
         if target in (sessions, login_links, login_attempts):
-            continue  # a restore lets nobody in who would not be let in by it now
+            continue  # a restore lets no one in who would not be let in by it now
         count = _copy_rows(reader, select(target), tx, target)
         report(f"{target.name}: {count} rows")
     _keep_out(tx, revoked, inactive)

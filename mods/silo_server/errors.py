@@ -55,7 +55,7 @@ class LinesChangedError(VersionConflictError):
 
 
 class ArchivedPartsError(ConflictError):
-    """A state of a BOM would bring archived parts back, and nobody said that it may."""
+    """A state of a BOM would bring archived parts back, and it was not allowed."""
 
     def __init__(self, part_numbers: Sequence[str]) -> None:
         super().__init__(

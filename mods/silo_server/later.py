@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """What is written down after its request: the uses of tokens, looks at products, and kept summaries.
 
-A thread of its own does it: nobody waits for it, it waits for nobody.
+A thread of its own does it: no request waits for it, and it waits for none.
 """
 
 from __future__ import annotations

@@ -72,7 +72,7 @@ class Welcome:
     """What the person who starts the server sees. ``login_secret`` belongs behind ``/login/link/``.
 
     Without an active admin there is no user, no token and no link. A token of the environment that lets
-    nobody in is not shown: ``warnings`` say why.
+    no one in is not shown: ``warnings`` say why.
     """
 
     username: str | None
@@ -393,7 +393,7 @@ def serve(
     given = token or os.environ.get("SILO_API_TOKEN") or None
     if given:
         check_configured_secret(given)
-    sock = _bind(host, port)  # first: if the port is taken, no token is made that nobody sees
+    sock = _bind(host, port)  # first: if the port is taken, no token is made that is not seen
     try:
         welcome = _prepare(settings, given, reset_admin)
     except BaseException:

@@ -130,9 +130,9 @@ class LineState:
     unreferenced_since
         since when no component of the assembly uses it (assembly lines only).
     override, cad_quantity
-        an assembly line whose quantity a person changed, and what the assembly had said.
+        an assembly line whose quantity a user changed, and what the assembly had said.
     reason
-        why a person keeps it as an intentional, non-CAD line.
+        why a user keeps it as an intentional, non-CAD line.
     """
 
     quantity: float

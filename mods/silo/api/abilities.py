@@ -18,7 +18,7 @@ KEPT_S = 24 * 3600.0
 
 
 class Abilities(BaseModel):
-    """What a server can do, kept for a day, so that each run need not try it again; None: nobody tried yet.
+    """What a server can do, kept for a day, so that each run need not try it again; None: not tried yet.
 
     Rights and modes are not kept, they change.
 

@@ -61,7 +61,7 @@ class ServerAddress:
 
     @classmethod
     def parse(cls, text: str) -> ServerAddress:
-        """Read an address as a person writes it; raises :class:`ConfigError` with what to write instead.
+        """Read an address as a user writes it; raises :class:`ConfigError` with what to write instead.
 
         All spellings of one address give the same value: capitals in the host, the scheme's own port, slashes
         at the end or doubled. The outbox finds what waits for a server by this form.

@@ -71,7 +71,7 @@ def find_arrived(
     """Find the revision that holds the file already; None if there is none, so that the file may be sent.
 
     Compares the server's checksum; if it keeps none, the size, and then the content of the revision's file.
-    Raises :class:`MayHaveArrivedError` if even that decides nothing: a person looks before it is sent a
+    Raises :class:`MayHaveArrivedError` if even that decides nothing: a user looks before it is sent a
     second time.
     """
     doubtful: list[Revision] = []

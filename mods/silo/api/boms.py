@@ -41,7 +41,7 @@ class BomsAnswer(Answer):
 
 
 class LineBody(LineTexts):
-    """``POST …/bom`` and ``PUT …/bom/{child}``: a line as a person writes it.
+    """``POST …/bom`` and ``PUT …/bom/{child}``: a line as a user writes it.
 
     ``source`` is for a merge by single calls, on a server that has no other.
     """
@@ -157,7 +157,7 @@ class BomCalls(Caller):
             reply = once(request)
         except RouteMissingError as missing:
             if if_match is not None:
-                raise  # Single calls cannot promise that nobody changed the BOM meanwhile.
+                raise  # Single calls cannot promise that the BOM was not changed meanwhile.
             try:
                 return merge_by_lines(self, part_number, request, host, cancelled=cancelled)
             except NotFoundError:
@@ -227,7 +227,7 @@ class BomCalls(Caller):
         return self._change("PUT", subject, *_bom(part_number), child, body=line).model(BomLine)
 
     def remove_bom_line(self, part_number: str, child: str, /) -> None:
-        """Remove a line. A person decides this; a merge never removes one."""
+        """Remove a line. A user decides this; a merge never removes one."""
         self._delete(f"{child} on the BOM of {part_number}", *_bom(part_number), child)
 
     def _what_is_missing(self, part_number: str, error: NotFoundError) -> NotFoundError:

@@ -36,7 +36,7 @@ from silo.bom.errors import SiloError
 
 @dataclass(frozen=True)
 class BrowserLogin:
-    """A login that a person confirms: the token to come, the page to open, the code that both sides show."""
+    """A login that a user confirms: the token to come, the page to open, the code that both sides show."""
 
     token: str
     page: str
@@ -132,7 +132,7 @@ class SiloClient(ItemCalls, BomCalls, TableCalls):
         return self._get("who we are", "auth", "me").model(User)
 
     def begin_login(self, program: str) -> BrowserLogin | None:
-        """Make a secret and the page on which a person lets this program in; None if the server has no such
+        """Make a secret and the page on which a user lets this program in; None if the server has no such
         page.
 
         The page shows the program and this computer. The program makes the secret itself, and the browser

@@ -137,7 +137,7 @@ class Connection(StrEnum):
     READ_ONLY = "read-only"  # events come in, the server takes no changes now
     DEGRADED = "degraded"  # events come in, a part of the server fails
     OFFLINE = "offline"  # no connection; it is tried again
-    REFUSED = "refused"  # the token is not accepted; not tried again before a person acts
+    REFUSED = "refused"  # the token is not accepted; not tried again before a user acts
     UNSUPPORTED = "unsupported"  # the server has no events; tried again rarely, it may be updated
     NO_READER = "no-reader"  # a Python package is missing; tried again rarely, it may be installed
     STOPPED = "stopped"  # by stop()
@@ -203,7 +203,7 @@ def _kind(pause: Pause) -> Connection:
 
 
 class Pauses:
-    """Where the pause of a server is kept: here, if nobody else asks the server."""
+    """Where the pause of a server is kept: here, if no other part asks the server."""
 
     _pause: Pause | None = None
 
@@ -275,7 +275,7 @@ class EventListener:
         self._thread.start()
 
     def retry_now(self) -> None:
-        """End the current pause: the network is back, or a person pressed the button."""
+        """End the current pause: the network is back, or a user pressed the button."""
         self._wake.set()
 
     def stop(self, timeout: float = 2.0) -> None:

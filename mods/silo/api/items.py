@@ -282,7 +282,7 @@ class ItemCalls(FileCalls):
         return self._get(f"schema {name}", "schemas", name).mapping()
 
     def find_schema(self, wanted: str = USUAL_SCHEMA) -> str:
-        """Find the name of the part-number schema to use: the wanted one; for the usual one, which nobody
+        """Find the name of the part-number schema to use: the wanted one; for the usual one, which is not
         chose, also the server's only one.
 
         Raises :class:`InputError` that lists the schemas if there are several others, or none.

@@ -2,7 +2,7 @@
 """Merging on servers of every age: the answer read strictly, else the BOM read back, else line by line.
 
 A server without merge (the real Silo's first phase) gets the same plan as single calls: added lines are
-added, changed quantities changed, nothing is removed and no line of a person is touched. That is not one
+added, changed quantities changed, nothing is removed and no line of a user is touched. That is not one
 step: what breaks off half-way continues with the next run, which plans from the lines as they are then.
 """
 
@@ -54,7 +54,7 @@ NOT_ATOMIC = "not_atomic"
 
 
 def unusual(result: MergeResult | None) -> list[str]:
-    """List, in sentences, what a person must know about a merge that was not a usual one."""
+    """List, in sentences, what a user must know about a merge that was not a usual one."""
     warnings = result.warnings if result is not None else ()
     return [warning.message for warning in warnings if warning.type in (UNCLEAR, NOT_ATOMIC)]
 
@@ -208,5 +208,5 @@ def _key(entry: MergeEntry) -> str:
 
 
 def _shows(line: BomLine | None, entry: MergeEntry) -> bool:
-    # A line that a person owns may have another quantity: a merge leaves it.
+    # A line that a user owns may have another quantity: a merge leaves it.
     return line is not None and (is_manual(line) or same_quantity(line.quantity, entry.quantity))

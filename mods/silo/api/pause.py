@@ -15,13 +15,13 @@ class Pause:
     """Why nothing is sent to a server, or nothing of one item, before ``until``.
 
     until
-        seconds since 1970; infinite: until a person acts.
+        seconds since 1970; infinite: until a user acts.
     code
         of the error.
     failures
         how often it failed in a row.
     told
-        the server itself named the time: only a person shortens it.
+        the server itself named the time: only a user shortens it.
     """
 
     until: float

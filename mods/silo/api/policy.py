@@ -4,7 +4,7 @@
 Three questions about an error have their answer here and nowhere else:
 
 * :func:`may_repeat`: may this very request be sent again at once?
-* :func:`judge`: whom does the error concern, and who can mend it?
+* :func:`judge`: whom does the error concern, and who can repair it?
 * :class:`Backoff`: how long is the pause before the next attempt? A :class:`~silo.api.pause.Pause` is that of
   one server.
 
@@ -13,11 +13,11 @@ error                                      concerns       then
 =========================================  =============  ==================================================
 no answer, 5xx, a proxy's web page         one or all (1) retry
 429, 503 with Retry-After, read-only       all            retry, not before the time that the server named
-401, an unusable configuration             all            a person: token, settings
-cancelled                                  all            retry when a person wants it
-403, a request that the server lacks       one kind (2)   a person (403); retry (a newer server may have it)
+401, an unusable configuration             all            a user: token, settings
+cancelled                                  all            retry when a user wants it
+403, a request that the server lacks       one kind (2)   a user (403); retry (a newer server may have it)
 404                                        one            retry (the server may be another one for a while)
-409, 412, other 4xx, bad input             one            a person
+409, 412, other 4xx, bad input             one            a user
 =========================================  =============  ==================================================
 
 1. ``alive`` finds out: where the server answers a plain question, only this entry has trouble.
@@ -60,10 +60,10 @@ class ErrorScope(StrEnum):
 
 
 class Then(StrEnum):
-    """Who can mend it."""
+    """Who can repair it."""
 
-    RETRY = "retry"  # nobody needs to do anything: try again later
-    PERSON = "person"  # the answer stays the same until a person changes something
+    RETRY = "retry"  # nothing needs to be done: try again later
+    PERSON = "person"  # the answer stays the same until a user changes something
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ def told_wait(error: SiloError) -> float | None:
 
 
 def may_repeat(error: SiloError, *, harmless: bool) -> bool:
-    """Return True if the same request may be sent again without a person.
+    """Return True if the same request may be sent again without a user.
 
     harmless
         the request may arrive twice: a question, or a change that names itself.
@@ -176,7 +176,7 @@ def pause_after(
     failures = max(failures, before.failures if before is not None else 0) + 1
     wait = told_wait(error)
     refused = isinstance(error, AuthError | ConfigError)
-    if isinstance(error, UnreachableError):  # a person who is back in the network wants to see it soon
+    if isinstance(error, UnreachableError):  # a user who is back in the network wants to see it soon
         backoff = replace(backoff, longest=max(backoff.first, min(backoff.longest, 60.0)))
     until = math.inf if refused else now + backoff.pause(failures, chance, wait)
     if before is not None and before.until > until:

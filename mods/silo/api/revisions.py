@@ -73,7 +73,7 @@ def standing(
         the number of that revision, for a server that keeps no checksums. Otherwise the checksum decides,
         since a server that was restored from a backup gives the same numbers to other files.
     seen
-        the newest revision that a person has seen and decided about: its number and its checksum.
+        the newest revision that a user has seen and decided about: its number and its checksum.
     """
     files = sorted((r for r in revisions if has_model(r)), key=lambda r: r.revision_number)
     mine = [
@@ -92,7 +92,7 @@ def newest_number(revisions: Iterable[Revision]) -> int:
 
 
 def is_newest(sha256: str, revisions: Iterable[Revision]) -> bool:
-    """Return True if the newest revision is this very file. An older one does not count: a person may go back
+    """Return True if the newest revision is this very file. An older one does not count: a user may go back
     to it.
     """
     newest = max(revisions, key=lambda revision: revision.revision_number, default=None)

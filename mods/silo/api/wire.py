@@ -204,7 +204,7 @@ class OrderList(Answer):
 
 
 FACTS = ("mass_kg", "volume_m3", "com_m", "size_m", "material")
-"""Properties whose origin is kept: a model states them, a scale does, or a person."""
+"""Properties whose origin is kept: a model states them, a scale does, or a user."""
 FactSource = Literal["hand", "scale", "cad"]
 
 
@@ -440,7 +440,7 @@ class ProductSummary(Answer):
     """What the server keeps of a product over all levels (``GET …/bom/summary``).
 
     open, incomplete
-        part number of a BOM → what a person has to decide there, and what its last sync left out.
+        part number of a BOM → what a user has to decide there, and what its last sync left out.
     total_mass_kg, totals
         without what ``mass_missing`` and ``cost_missing`` count.
     """
@@ -522,7 +522,7 @@ class Revision(Record):
     """A revision of an item; ``file_checksum`` is the SHA-256 of its file, in hex.
 
     base_revision
-        the revision that the file was made from; None where nobody said.
+        the revision that the file was made from; None if not stated.
     file_path
         where the file was, relative to the folder that holds it and all that it links to.
     links
@@ -802,7 +802,7 @@ class ServerState(Record):
     browser_login
         the page ``/login/program`` lets a program in.
     freecad
-        the FreeCAD that the team works with, such as "1.0"; "" if nobody has said.
+        the FreeCAD that the team works with, such as "1.0"; "" if not stated.
     """
 
     mode: str = "normal"
@@ -815,5 +815,5 @@ class ServerState(Record):
 
 
 def login_code(proof: str) -> str:
-    """Return the code that a program and the page that lets it in both show, so that a person can compare."""
+    """Return the code that a program and the page that lets it in both show, so that a user can compare."""
     return f"{proof[:4]}-{proof[4:8]}".upper()

@@ -55,7 +55,7 @@ class BomEntry:
     unregistered
         direct children without a part number, which ``children`` no longer has once they are resolved.
     own
-        what an assembly shows of its own file and is no item yet: never sent, until a person declares it.
+        what an assembly shows of its own file and is no item yet: never sent, until a user declares it.
     variant
         the values of a configured copy ("L = 300 mm"); ``doc_path`` and ``object_name`` are its original's,
         the children its own. "" for anything else.

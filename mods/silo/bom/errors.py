@@ -4,7 +4,7 @@
 ::
 
     SiloError
-    ├── InputError              ours to mend: a file, an argument, a configuration
+    ├── InputError              ours to repair: a file, an argument, a configuration
     │   ├── DocumentError       a FreeCAD document cannot be read or written
     │   ├── SeveralAssembliesError  a document holds several, and none was named
     │   └── ConfigError         the configuration is missing or contradicts itself
@@ -20,15 +20,15 @@
     │   ├── RejectedError       400, 413, 422: the server names what it does not accept
     │   ├── ReadOnlyError       503: the server takes no changes now
     │   └── ServerFaultError    any other 5xx, or an answer that cannot be understood
-    ├── ConflictError           nobody's: two truths met (409)
+    ├── ConflictError           no one's: two truths met (409)
     │   ├── CycleError          the BOM would contain itself
     │   ├── NewerRevisionError  somebody committed the item since this file was opened
     │   ├── MissingRevisionError  the server does not have the file that this BOM is of
     │   └── VersionConflictError  412: somebody else changed it first
-    └── CancelledError          a person stopped it; not a failure
+    └── CancelledError          a user stopped it; not a failure
 
 A message says what was wanted, what was got, where, and what to do. It is English, for it is stored, compared
-and sent; :func:`spoken` says it in the language of a person where it is shown.
+and sent; :func:`spoken` says it in the language of a user where it is shown.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def exit_of(error: BaseException) -> Exit:
     """Return the exit code of an error; it says whose fault the error is."""
     if isinstance(error, KeyboardInterrupt | CancelledError):
         return Exit.CANCELLED
-    if isinstance(error, ConflictError):  # two truths met: a person decides
+    if isinstance(error, ConflictError):  # two truths met: a user decides
         return Exit.UNDONE
     refused = isinstance(error, RejectedError) or type(error) is NotFoundError
     return Exit.REMOTE if isinstance(error, RemoteError) and not refused else Exit.BAD_INPUT
@@ -201,7 +201,7 @@ class DocumentError(InputError):
 
 
 class SeveralAssembliesError(InputError):
-    """A file holds several assemblies, and nobody said which is meant; ``names``: those of FreeCAD."""
+    """A file holds several assemblies, and none was chosen; ``names``: those of FreeCAD."""
 
     code = "several_assemblies"
 
@@ -217,7 +217,7 @@ class ConfigError(InputError):
 
 
 class PackageError(ConfigError):
-    """A Python package that is needed cannot be imported; installing it mends that."""
+    """A Python package that is needed cannot be imported; installing it repairs that."""
 
     code = "bad_package"
 
@@ -312,7 +312,7 @@ class ServerFaultError(RemoteError):
 
 
 class ConflictError(SiloError):
-    """Two truths met (409); a person or a new read decides."""
+    """Two truths met (409); a user or a new read decides."""
 
     status_hint = 409
     code = "conflict"
@@ -352,7 +352,7 @@ class VersionConflictError(ConflictError):
 
 
 class CancelledError(SiloError):
-    """A person stopped it. Nothing is wrong; what was done before the stop stays done."""
+    """A user stopped it. Nothing is wrong; what was done before the stop stays done."""
 
     status_hint = 499
     code = "cancelled"

@@ -2,7 +2,7 @@
 """What a run noticed: one code, one severity, one plain sentence, and where.
 
 Everything that is not counted, or counted with a doubt, is explained by a finding; nothing is dropped in
-silence. A finding of severity ERROR keeps a BOM from being synced until a person says otherwise: a missing
+silence. A finding of severity ERROR keeps a BOM from being synced until a user says otherwise: a missing
 file must never read as "removed".
 """
 
@@ -18,7 +18,7 @@ class Severity(StrEnum):
     """How much a finding matters."""
 
     INFO = "info"  # for completeness: this is how it was counted
-    WARNING = "warning"  # counted, or left out, in a way a person should look at
+    WARNING = "warning"  # counted, or left out, in a way a user should look at
     ERROR = "error"  # the BOM cannot be trusted; it is not synced without consent
 
 
@@ -33,7 +33,7 @@ class FindingCode(StrEnum):
     meaning
         what several of them have in common, in words, as in "15 × ...".
     remedy
-        what a person does about it, for the reference; in Markdown.
+        what a user does about it, for the reference; in Markdown.
     sentence, tail
         the message about an object, and how it ends: with all objects (``users``) that it is about, or with
         advice.

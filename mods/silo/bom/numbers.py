@@ -8,7 +8,7 @@ is pure text; units belong to the callers. The rules:
 ``1.5``  ``1,5``      1.5: both decimal marks are read
 ``1,234.5``           1234.5: where both marks stand, the last one is the decimal mark
 ``1,000``  ``1.000``  ambiguous: 1000 or 1. Refused with both readings, unless the caller knows the mark
-``0,500``             0.5: nobody writes thousands as 0,500
+``0,500``             0.5: thousands are not written as 0,500
 ``1 000``  ``1'000``  1000: spaces and apostrophes between groups of three digits separate thousands
 ``1_000``             1000: so does an underscore
 ``1e3``  ``1.5E-3``   1000, 0.0015: scientific notation
@@ -34,7 +34,7 @@ from silo.bom.quantities import LARGEST_QUANTITY, plain
 from silo.bom.units import known_unit
 
 LONGEST = 40
-"""[characters] no number that a person types is longer."""
+"""[characters] no number that a user types is longer."""
 
 
 class Mark(StrEnum):

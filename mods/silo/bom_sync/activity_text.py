@@ -16,7 +16,7 @@ from silo.bom.errors import Translate, english
 
 @dataclass(frozen=True)
 class ActivityText:
-    """What one merge shows: a headline, the counts, and where a person decides."""
+    """What one merge shows: a headline, the counts, and where a reviewer decides."""
 
     headline: str
     counts: str

@@ -17,7 +17,7 @@ from silo.bom.errors import SiloError
 from silo.bom_sync.memory import Memory, server_of
 from silo.platform import data_folder
 
-# Each costs a request, and only while nobody has registered the part.
+# Each costs a request, and only while the part is not registered.
 MOST_LOOKED_UP = 200
 
 

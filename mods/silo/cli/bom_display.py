@@ -44,7 +44,7 @@ _DIFFERENCE = {
     "manual": ("✎", "blue", "manual line; not touched"),
 }
 
-# A tree longer than this helps nobody on a terminal; a pipe and --json have it all.
+# A tree longer than this does not help on a terminal; a pipe and --json have it all.
 _MOST_LINES = 2000
 
 
@@ -135,7 +135,7 @@ def summary_text(summary: ProductSummary) -> Text:
 
 
 def diff_table(diff: BomDiff, names: Mapping[str, str], *, whole: bool = True) -> RenderableType:
-    """Draw the difference of CAD and server: a row for each line that differs or that a person added.
+    """Draw the difference of CAD and server: a row for each line that differs or that a user added.
 
     whole
         False if components are missing or have no number: then it is not known that nothing differs.

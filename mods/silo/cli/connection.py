@@ -29,7 +29,7 @@ def client_of(
     retries
         how often and how soon a request is repeated, for a job that may wait.
     stop
-        once it is set, nobody waits for the server any more.
+        once it is set, no command waits for the server any more.
     """
     from silo.api.abilities import abilities_path
     from silo.api.client import SiloClient
@@ -69,7 +69,7 @@ def account_of(client: SiloClient) -> tuple[str | None, str | None]:
 
 
 def named_item(client: SiloClient, number: str) -> Item:
-    """Get the item that a person named. InputError if there is none, since then the name is wrong."""
+    """Get the item that a user named. InputError if there is none, since then the name is wrong."""
     try:
         return client.get_item(number)
     except RouteMissingError:

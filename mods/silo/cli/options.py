@@ -195,7 +195,7 @@ class _OldName(argparse.Action):
 
 
 def only_with(parser: argparse.ArgumentParser, needed: str, *options: str) -> None:
-    """Refuse ``options`` without the option ``needed``, since a person expects that an option does something.
+    """Refuse ``options`` without the option ``needed``, since a user expects that an option does something.
 
     ``needed`` may name several, such as "--apply --plan"; any of them is enough.
     """

@@ -21,7 +21,7 @@ class ProgressPrinter:
     """Prints on standard error what a command does, after 5 seconds and then every 10.
 
     A thread prints it, so that a long step is reported too. An empty ``step`` is silence, for commands that
-    wait for a person.
+    wait for a decision.
     """
 
     def __init__(self, command: str, clock: Callable[[], float] = time.monotonic) -> None:

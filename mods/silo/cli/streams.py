@@ -25,7 +25,7 @@ def open_streams() -> None:
 
 
 class OutputStream(io.TextIOBase):
-    """A stream whose end does not end the work: what nobody can read any more is dropped, the rest is done.
+    """A stream whose end does not end the work: what can no longer be read is dropped, the rest is done.
 
     ``head`` closes its pipe after ten lines, a disk is full: a sync is finished anyway, and its report
     written. ``failure`` is what went wrong. ``strict``: raise it instead, for commands without an end. What a

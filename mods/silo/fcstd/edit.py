@@ -74,7 +74,7 @@ def replace_file(path: str, state: FileStat, content: Iterable[Piece], check: Ca
     check
         looks at the copy that was written, and raises DocumentError if it is not as it should be.
     """
-    # The file is closed by now: Windows lets nobody replace an open one.
+    # The file is closed by now: Windows does not let an open one be replaced.
     try:
         _write(path, state, content, check)
     except OSError as error:

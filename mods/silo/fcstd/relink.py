@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Lead the links of FreeCAD files to a file that has moved.
 
-FreeCAD has no way to mend a link whose target has moved but to make it again, which loses placements and
+FreeCAD has no way to repair a link whose target has moved but to make it again, which loses placements and
 joints. Here only the recorded path changes: object, sub-names and the rest of the file stay as they are.
 """
 
@@ -28,7 +28,7 @@ _FILE = re.compile(rb"""(\sfile\s*=\s*)("[^"]*"|'[^']*')""")
 
 @dataclass(frozen=True)
 class Relinked:
-    """A file whose links were mended, or would be: its path, how many links, and to which objects."""
+    """A file whose links were repaired, or would be: its path, how many links, and to which objects."""
 
     path: str
     links: int
@@ -48,7 +48,7 @@ def relink(
     dry_run: bool = False,
     check: Callable[[str], None] = lambda _path: None,
 ) -> list[Relinked]:
-    """Mend the links of these files that record ``old``, to lead to ``new``.
+    """Repair the links of these files that record ``old``, to lead to ``new``.
 
     Returns the files that hold such links. Raises InputError if ``new`` does not hold the objects that they
     want, DocumentError if a file cannot be read or written; both before anything is changed.
@@ -136,7 +136,7 @@ def _mend(relinked: Relinked, old: str, target: str, limits: Limits) -> None:
 
 
 def read_back(relinked: Relinked, copy: str, old: str, target: str, before: int) -> None:
-    """Raise DocumentError unless the mended copy can be read and its links are as they should be.
+    """Raise DocumentError unless the repaired copy can be read and its links are as they should be.
 
     before
         how many links led to the target already.

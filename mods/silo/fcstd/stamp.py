@@ -94,7 +94,7 @@ def unstamp(
     """Take the identity of one object out of the file; returns False if there was nothing to do.
 
     no_part
-        the object gets ``SiloBomExclude``: a person decided that it is no part. Otherwise the property is
+        the object gets ``SiloBomExclude``: a user decided that it is no part. Otherwise the property is
         removed.
 
     The document's own identity stays. Raises DocumentError as :func:`stamp` does.

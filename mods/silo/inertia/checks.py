@@ -65,7 +65,7 @@ def check_frames(report: InertiaReport, claims: Claims, task: Task) -> None:
 
 
 def check_far_frames(report: InertiaReport, claims: Claims, task: Task) -> None:
-    """Warn of frames that a person wrote, far outside of the assembly.
+    """Warn of frames that a user wrote, far outside of the assembly.
 
     The person probably wrote millimetres instead of metres.
     """

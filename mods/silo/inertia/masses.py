@@ -48,7 +48,7 @@ class Options:
         without a BOM, a part whose file states no density counts as 0 kg instead of the default density:
         for FreeCAD documents.
     own_bom
-        the geometry file is its own BOM, so that nobody misses another one.
+        the geometry file is its own BOM, so that no other one is missed.
     """
 
     default_density: float = 1000.0

@@ -86,7 +86,7 @@ def digits(name: str) -> tuple[str, ...]:
 
 
 class Suggester:
-    """Names a person may have meant: alike by difflib, all digits equal. For messages only.
+    """Names a user may have meant: alike by difflib, all digits equal. For messages only.
 
     ``budget``: comparisons before it falls silent; proposals are a courtesy, and must not take minutes for a
     BOM of thousands that fits nothing.

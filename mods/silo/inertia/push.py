@@ -68,7 +68,7 @@ class Pushed:
     """What was done: part numbers by outcome. ``failed``: not written, and why.
 
     by_hand
-        items that keep what a person typed or a scale said.
+        items that keep what a user typed or a scale said.
     """
 
     written: tuple[str, ...] = ()

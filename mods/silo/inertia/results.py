@@ -88,7 +88,7 @@ def _parts(assembly: Assembly, placed: Placed, indices: Iterable[int], link: str
     """Group the pieces with the same name, size, mass and source of mass, even if they are different
     products.
 
-    In many files, the fourteen balls of a bearing are fourteen products; a person wants to see one line.
+    In many files, the fourteen balls of a bearing are fourteen products; a user wants to see one line.
     """
     groups: dict[tuple[object, ...], list[int]] = {}
     for index in indices:

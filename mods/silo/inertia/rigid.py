@@ -60,7 +60,7 @@ class MassProps:
     mass : float [kg]
     com : (3,) float [m], in the frame
     inertia : (3, 3) float [kg m^2], about ``com``, axes of the frame
-    frame : which frame, in words; "" if nobody said. Bodies of two named frames cannot be added.
+    frame : which frame, in words; "" if not stated. Bodies of two named frames cannot be added.
 
     ``center_mass``, ``moment_inertia`` and the principal ones are the same under the names that trimesh has.
     """

@@ -81,7 +81,7 @@ class UrdfText:
     """One URDF: its links with their places in the text, and its joints.
 
     Raises InputError if ``data`` is no URDF that can be read (also for DOCTYPE: not needed in a URDF, and
-    a way to attack its reader), and for two links of one name or two inertials in one link: nobody knows
+    a way to attack its reader), and for two links of one name or two inertials in one link: it is unknown
     which one counts.
     """
 

@@ -186,7 +186,7 @@ def _connected(path: Path) -> sqlite3.Connection:
 
 
 def _removed(path: Path) -> bool:
-    """Delete a database that nobody has open; returns True if it is gone."""
+    """Delete a database that is not open; returns True if it is gone."""
     guard = hold_lock(f"{path}.lock")
     if guard is None:
         return False

@@ -72,7 +72,7 @@ def pool_of(jobs: int, dask: str | None = None, *, worth: int = _WORTH_A_POOL) -
     if dask is not None:
         with _dask_client(dask) as client:
             workers = sum(client.nthreads().values())
-            # Dask cancels tasks for which nobody waits, even those that have begun.
+            # Dask cancels tasks that are not waited for, even those that have begun.
             yield Pool(
                 client.get_executor,
                 max(1, workers),

@@ -451,7 +451,7 @@ def commits(
     """Make the commits of files that differ from Silo, and of the BOMs of the assemblies.
 
     over_newer
-        files that are sent on top of newer revisions in Silo, which a person saw.
+        files that are sent on top of newer revisions in Silo, which a user saw.
     boms
         the places of the files in Silo whose BOMs go as well; None: all of them.
     hold

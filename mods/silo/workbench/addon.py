@@ -77,7 +77,7 @@ class AddOn:
     def _begin(self) -> None:
         self.session.begin(live=self.preferences.flag("LiveActivity"))
         self.opened.begin(self.session.look)
-        # The first commit should be as quick as the others: its modules are imported while nobody waits. Only
+        # The first commit should be as quick as the others: its modules are imported before. Only
         # what has no widgets comes from the worker, for the classes of those are made in the GUI thread.
         self.session.aside(
             "Getting ready",

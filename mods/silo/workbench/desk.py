@@ -66,7 +66,7 @@ class Desk(Protocol):
         """Close a document without saving it."""
 
     def warn(self, title: str, text: str, /) -> None:
-        """Show a message that a person must see."""
+        """Show a message that a user must see."""
 
     def later(self, call: Callable[[], None], /) -> None:
         """Run something in a turn of its own, once the present event is done."""

@@ -60,7 +60,7 @@ class LiveDocuments:
 
 
 class LiveDesk:
-    """One per FreeCAD. Widgets are imported when a person is to see one."""
+    """One per FreeCAD. Widgets are imported when a user is to see one."""
 
     def __init__(self, opened: Opened, count_hardware: Callable[[], bool] = lambda: True) -> None:
         self._count_hardware = count_hardware

@@ -3,7 +3,7 @@
 
 ``translate`` has the signature of ``FreeCAD.Qt.translate``, so Qt's tools find the texts; inside FreeCAD it
 is that function, elsewhere the text stays as it is. What comes from files and servers passes through
-:func:`plain` before it is shown: it may not steer a terminal, a label or a person.
+:func:`plain` before it is shown: it may not steer a terminal, a label or a user.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 """A workbook (XLSX, ODS, XLS) → its sheets.
 
 XLSX and ODS are read from their XML, XLS by xlrd. Readers that give values alone lose what decides a mass: an
-error, or a formula that nobody has calculated, looks like an empty cell, and "12.5 g" is 12.5.
+error, or a formula that was not calculated, looks like an empty cell, and "12.5 g" is 12.5.
 """
 
 from __future__ import annotations

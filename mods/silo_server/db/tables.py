@@ -47,7 +47,7 @@ Stamp = String(32)
 Key = String(64).with_variant(String(64, collation="C"), "postgresql")
 Uuid = String(36)
 
-# What waits for a person, for indexes that hold little else; a query must say it in these words.
+# What waits for a decision, for indexes that hold little else; a query must say it in these words.
 UNREFERENCED = "unreferenced_since IS NOT NULL"
 WITH_UNIT = "unit IS NOT NULL"
 INCOMPLETE = "left_out <> '[]' OR refused_at IS NOT NULL"
@@ -303,7 +303,7 @@ product_summaries = Table(
     needed("sets", Text),
 )
 
-# When a person looked at a product last, and the time before, for what changed since.
+# When a user looked at a product last, and the time before, for what changed since.
 product_looks = Table(
     "product_looks",
     metadata,
@@ -313,7 +313,7 @@ product_looks = Table(
     Column("since", Stamp),
 )
 
-# What a person follows ("item:UUID", "folder:PATH"), and up to when and which event they have seen its news.
+# What a user follows ("item:UUID", "folder:PATH"), and up to when and which event they have seen its news.
 follows = Table(
     "follows",
     metadata,

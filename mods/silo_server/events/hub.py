@@ -4,7 +4,7 @@
 The log in the database is the truth. The hub keeps the newest part of it in memory (the ring) as ready-made
 frames and wakes all listeners when it grows. A listener is only a cursor, the id of the last event it was
 given; it takes what is newer from the ring or, if it is too slow or was away, from the log. So a slow
-client blocks nobody, costs nothing and loses nothing; only one that is behind the log's horizon is sent
+client blocks no other, costs nothing and loses nothing; only one that is behind the log's horizon is sent
 ``reset`` and must read everything again.
 
 News arrive by a call after a commit in this process, by PostgreSQL's NOTIFY from another, and at the latest

@@ -164,6 +164,6 @@ async def _disk_error(request: Request, error: Exception) -> Response:
 
 
 async def _disconnected(request: Request, error: Exception) -> Response:
-    # Nobody reads this answer; the request was never whole, so nothing was done.
+    # This answer is not read; the request was never whole, so nothing was done.
     logger.info("request %s: the client went away in the middle of its body", info_of(request.scope).id)
     return error_answer(400, "rejected", "the request's body ended too soon")

@@ -119,7 +119,7 @@ def list_items(
 def search_items(
     call: Viewer, q: Word = "", item_type: Word | None = None, limit: Limit = 20, offset: Offset = 0
 ) -> Response:
-    """Search items as a person types: an item must have every word, in any of the searched texts."""
+    """Search items as a user types: an item must have every word, in any of the searched texts."""
     return list_items(call, q, item_type=item_type, limit=limit, offset=offset)
 
 
@@ -417,7 +417,7 @@ def numbered(part_number: str) -> Find:
 async def receive(call: Call, find: Find) -> Response:
     """Store an upload as a new revision of an item or a document.
 
-    The form is read here and not by a parameter, so that nobody without a role fills the disk.
+    The form is read here and not by a parameter, so that no one without a role fills the disk.
     """
     async with call.request.form(max_files=1, max_fields=20, max_part_size=_MAX_FIELD) as form:
         twice = [name for name in _FORM if len(form.getlist(name)) > 1]

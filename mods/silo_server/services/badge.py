@@ -13,7 +13,7 @@ from silo_server.services.following import followed
 
 
 def badge(tx: Tx, actor: Actor) -> int:
-    """Count what waits for a person: the open BOMs that are theirs, and the news of what they follow."""
+    """Count what waits for a decision: the open BOMs that are theirs, and the news of what they follow."""
     theirs = select(assignees.c.item_id).where(assignees.c.user_id == actor.own_id)
     ids = list(tx.conn.scalars(theirs))
     mine = open_among(tx, ids) if ids else 0

@@ -69,7 +69,7 @@ class FileStore:
     def renew(self, checksum: str) -> bool:
         """Make the file with this hash count as new; return True if it is here and undamaged.
 
-        For callers that are about to refer to it: meanwhile nobody deletes it as old and unused.
+        For callers that are about to refer to it: meanwhile it is not deleted as old and unused.
         """
         try:
             os.utime(self._place(checksum))
@@ -179,5 +179,5 @@ def clean_name(name: str) -> str:
     """Make the name of a download: the last part of a file name, without control characters."""
     last = name.replace("\\", "/").rpartition("/")[2]
     cleaned = "".join(c for c in last if c.isprintable()).strip(" .")
-    # A person on Windows cannot save a download that is called CON.
+    # A user on Windows cannot save a download that is called CON.
     return no_device_name(cleaned)[:200] or "file"

@@ -85,7 +85,7 @@ def have_seen(tx: Tx) -> None:
 
 
 def followed(tx: Tx, actor: Actor, *, whole: bool = True) -> list[Followed]:
-    """Read what a person follows, news first. Not ``whole``: does not count the BOMs that wait in folders."""
+    """Read what a user follows, news first. Not ``whole``: does not count the BOMs that wait in folders."""
     rows = tx.conn.execute(select(follows).where(follows.c.user_id == actor.own_id)).all()
     if not rows:
         return []

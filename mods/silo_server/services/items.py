@@ -391,7 +391,7 @@ def change_item(tx: Tx, part_number: str, change: ItemChange, expected: int | No
 
 
 def _kept_from_cad(item: Item) -> list[str]:
-    """List the facts that a person typed, or read from a scale: CAD does not replace them."""
+    """List the facts that a user typed, or read from a scale: CAD does not replace them."""
     return [n for n in FACTS if n in item.properties and item.origins.get(n, {}).get("source") != "cad"]
 
 
@@ -401,7 +401,7 @@ _FACT_WORDS = {"mass_kg": "mass", "size_m": "size", "volume_m3": "volume", "com_
 def fill_in(tx: Tx, part_number: str, stated: Stated, checksum: str) -> None:
     """Update an item with what its file states.
 
-    What a person typed or a scale measured stays. A value that came from CAD is removed if the file does not
+    What a user typed or a scale measured stays. A value that came from CAD is removed if the file does not
     state it any more, but not if size and material are still the same.
     """
     item = get_item(tx, part_number, lock=True)

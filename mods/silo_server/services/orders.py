@@ -4,7 +4,7 @@
 The parts are those of the one flat list (:func:`silo_server.services.product.flat.flatten`), where a bought
 assembly counts as a part. What is open comes from the kept summary, or from the release. Bought parts
 have a supplier and a price (:mod:`silo_server.services.suppliers`), made parts a material, a mass and
-their files. Nothing is left out: what nobody called made or bought is listed as such.
+their files. Nothing is left out: what was called neither made nor bought is listed as such.
 """
 
 from __future__ import annotations
@@ -121,7 +121,7 @@ class OrderRow(NamedTuple):
 
     @property
     def supplier(self) -> str:
-        """Return the name of the supplier; "" if nobody is known."""
+        """Return the name of the supplier; "" if none is known."""
         return self.offer.of.supplier if self.offer else ""
 
     @property
@@ -176,7 +176,7 @@ class OrderList:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Count the parts by kind: bought, made, and those that nobody called either."""
+        """Count the parts by kind: bought, made, and those that were called neither."""
         return {BOUGHT: 0, MADE: 0, UNSAID: 0} | Counter(row.kind for row in self.rows)
 
     @property

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Supplier parts: an item as its suppliers sell it, with packs, minimum, price breaks and lead time.
 
-An item has a list of them, which changes as a whole: what a person saves is one change, which can be undone.
+An item has a list of them, which changes as a whole: what a user saves is one change, which can be undone.
 An item without a list has the supplier part that its properties state (``supplier``, ``standard_cost``, …).
 
 Money and amounts are decimals, here and in what is stored; the one parser of the project reads them, so
@@ -311,7 +311,7 @@ def _places(value: Decimal) -> int:
 
 
 def read_parts(tx: Tx, rows: Sequence[Mapping[str, str]], *, dot: bool = False) -> list[SupplierPart]:
-    """Read a table that a person filled in, without its empty rows. RejectedError lists all problems."""
+    """Read a table that a user filled in, without its empty rows. RejectedError lists all problems."""
     reader = _Reader(None, dot, next(iter(rates_of(tx))))
     read = [
         (number, *reader.read(cells))
@@ -558,7 +558,7 @@ def apply_suppliers(tx: Tx, read: PriceRows) -> list[ImportedItem]:
 
 
 def rates_of(tx: Tx) -> dict[str, Decimal]:
-    """Read what one of each currency is worth in the site's own, which is first; EUR if nobody set one."""
+    """Read what one of each currency is worth in the site's own, which is first; EUR if none is set."""
     typed: dict[str, str] = json.loads(get_state(tx, _RATES) or '{"EUR":"1"}')
     return {currency: Decimal(rate) for currency, rate in typed.items()}
 

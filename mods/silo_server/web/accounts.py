@@ -278,7 +278,7 @@ def log_out(call: Reader) -> Response:
 
 @router.post("/language", dependencies=[Depends(own_form)])
 def choose_language(form: Form) -> Response:
-    """Keep the language that a person chose, in a cookie of this browser."""
+    """Keep the language that a user chose, in a cookie of this browser."""
     chosen = text(form, "language")
     if chosen not in LANGUAGES:
         raise RejectedError(f"language: wanted one of {', '.join(LANGUAGES)}, got {chosen!r}")

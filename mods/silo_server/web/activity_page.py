@@ -50,7 +50,7 @@ class EventView(NamedTuple):
     """How the page shows events of a name.
 
     kind
-        what a person may look for.
+        what a user may look for.
     words
         with values of the event's data.
     below
@@ -151,7 +151,7 @@ def activity_page(
 
 
 def _day(text: str) -> str:
-    """Read a day; "" for anything else, as a filter that nobody can mean filters nothing."""
+    """Read a day; "" for anything else, as a filter without a meaning filters nothing."""
     with suppress(ValueError):
         return date.fromisoformat(text).isoformat()
     return ""
@@ -351,7 +351,7 @@ STATUSES = (N_("added"), N_("removed"), N_("changed"), N_("unchanged"))
 
 @router.post("/items/{part_number}/restore")
 def restore(call: Writer, part_number: str, form: Form) -> Response:
-    """Restore an earlier state of the BOM, as a new change, if nobody changed it since the page was shown."""
+    """Restore an earlier state of the BOM as a new change, if the page showed the newest."""
     change_id, reason = whole(form, "change_id"), text(form, "reason")
     if change_id is None:
         raise RejectedError(_("change_id: wanted the number of a change, got none; load the page again"))

@@ -128,7 +128,7 @@ class Edit:
     """What a form changes; others may have changed the same thing since it was shown.
 
     mine
-        what this person changed, and nobody else: to be written.
+        what this person changed, and no one else: to be written.
     clashes
         fields that this person and somebody else changed, each to something else: the person chooses.
     theirs
@@ -143,7 +143,7 @@ class Edit:
 def same_text(a: str, b: str, *, lines: bool = False) -> bool:
     """Check if a form sends both texts back alike: without spaces at the ends, and without line breaks.
 
-    Programs store texts with them; if only the browser took them away, nobody has changed the text.
+    Programs store texts with them; if only the browser took them away, the text was not changed.
 
     lines
         the field has several lines, and keeps their breaks, each as one line feed.

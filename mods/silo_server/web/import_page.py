@@ -59,7 +59,7 @@ class Upload:
 
 @router.get("/items/{part_number}/import")
 def import_page(call: Writer, part_number: str) -> Response:
-    """Show the form in which a person chooses a file."""
+    """Show the form in which a user chooses a file."""
     return _show(call, part_number, None)
 
 
@@ -205,7 +205,7 @@ ROLE_WORDS: dict[str, str] = {
 
 
 def reading(file: Upload, layout: Layout | None, of: TableKind = BOM) -> dict[str, Any]:
-    """Describe how the file is read, for the form in which a person changes that."""
+    """Describe how the file is read, for the form in which a user changes that."""
     guessed = layout or guess_layout(file.data, "file", of)
     delimiter, lines = first_lines(file.data, "file", of, guessed.delimiter if guessed else None)
     layout_read = guessed or Layout(delimiter, 0)

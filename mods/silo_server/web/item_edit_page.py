@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Making items and changing them: names, category, properties of the schema and others, files, the archive.
 
-A form sends what it was made from beside what was typed, so that only what a person changed is changed. Where
+A form sends what it was made from beside what was typed, so that only what a user changed is changed. Where
 somebody else changed the same field meanwhile, nothing is saved and the page shows both.
 """
 

@@ -52,7 +52,7 @@ from silo_server.web.item_edit_page import shown_properties
 from silo_server.web.releases_page import state_of
 from silo_server.web.render import PAGE_ROWS, Address, Page, _, arranged, page, page_of, segment
 
-# More open rows than this nobody pages through; a filter or fewer levels bring them down.
+# No reader pages through more open rows than this; a filter or fewer levels bring them down.
 MOST_OPEN = 20_000
 # A filter and the flat list read all lines of a product, up to so many.
 MOST_READ = 20_000
@@ -561,7 +561,7 @@ def items_page(
     sort: Annotated[str, Query(max_length=20)] = "",
     number: Annotated[int, Query(ge=1, le=10**7, alias="page")] = 1,
 ) -> Response:
-    """Show the items that match; the search runs while a person types or, without script, by its form."""
+    """Show the items that match; the search runs while a user types or, without script, by its form."""
     query = ItemQuery(
         search=q,
         item_type=type or None,

@@ -33,7 +33,7 @@ from silo_server.web.forms import Edit, amount, compared, same_text, text, texts
 from silo_server.web.render import N_, _, isolate, plural, quantity
 
 TEXTS = LineTexts.model_fields
-# What a person fills in on a line, with its label.
+# What a user fills in on a line, with its label.
 FIELDS = {
     "quantity": N_("Quantity"),
     "reference_designators": N_("Reference designators"),
@@ -221,7 +221,7 @@ def disputed(
 
 
 def _quantity_by(story: Sequence[tuple[Change, ChangedLine]]) -> Change | None:
-    """Find the change in which a person gave a line its present quantity; None if a merge did."""
+    """Find the change in which a user gave a line its present quantity; None if a merge did."""
     for change, line in story:
         before = line.before.quantity if line.before else None
         if line.after is not None and line.after.quantity != before:
@@ -232,7 +232,7 @@ def _quantity_by(story: Sequence[tuple[Change, ChangedLine]]) -> Change | None:
 def _cad_words(
     line: Line, quantities: Mapping[int, float], by_hand: Change | None, merge: Change | None
 ) -> str:
-    """Describe CAD's quantity for a line that a person changed; the conflict above it says the same."""
+    """Describe CAD's quantity for a line that a user changed; the conflict above it says the same."""
     if line.child_id in quantities:
         cad_quantity = quantities[line.child_id]
         return (

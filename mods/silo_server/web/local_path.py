@@ -5,6 +5,6 @@ from __future__ import annotations
 
 
 def local_path(target: str) -> str:
-    """Return ``target`` if it is a path of this server, else the start page: nobody is sent elsewhere."""
+    """Return ``target`` if it is a path of this server, else the start page: no browser is sent elsewhere."""
     plain = target.startswith("/") and not target.startswith(("//", "/\\"))
     return target if plain and target.isprintable() else "/"

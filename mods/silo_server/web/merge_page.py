@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The page at ``resolve_url``: what a merge left for a person to decide, and the BOM's lines."""
+"""The page at ``resolve_url``: what a merge left to decide, and the BOM's lines."""
 
 from __future__ import annotations
 

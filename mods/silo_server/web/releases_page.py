@@ -34,7 +34,7 @@ from silo_server.web.render import N_, Address, _, page, page_of, segment
 
 router = APIRouter(include_in_schema=False)
 
-# More rows of a frozen tree nobody pages through; an export has all of them.
+# No reader pages through more rows of a frozen tree; an export has all of them.
 MOST_ROWS = 20_000
 ENDS = (N_("rejected"), N_("withdrawn"), N_("obsolete"))
 

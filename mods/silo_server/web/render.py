@@ -415,7 +415,7 @@ def page(call: Call, template: str, *, status: int = 200, **values: Any) -> Resp
 def page_for(
     request: Request, actor: Actor | None, template: str, *, status: int = 200, **values: Any
 ) -> Response:
-    """Make a page. ``actor`` None: nobody is logged in. A notice that waits in its cookie is shown once.
+    """Make a page. ``actor`` None: no one is logged in. A notice that waits in its cookie is shown once.
 
     Do not call it on the event loop: it reads the server's mode from the database.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""All BOMs that wait for a person, by project folder, with one decision for many of them.
+"""All BOMs that wait for a decision, by project folder, with one decision for many of them.
 
 What waits for the person who looks: the open BOMs that are theirs, and the news of what they follow.
 """
@@ -70,7 +70,7 @@ def waiting_page(
     sort: Annotated[str, Query(max_length=20)] = "",
     number: Annotated[int, Query(ge=1, le=10**7, alias="page")] = 1,
 ) -> Response:
-    """Show the BOMs that wait: in ``folder`` and below, those that ``who`` settles (``-``: nobody)."""
+    """Show the BOMs that wait: in ``folder`` and below, those that ``who`` settles (``-``: no one)."""
     view = {"q": q, "folder": folder, "kind": kind, "who": who, "sort": sort}
     view |= {"page": str(number) if number > 1 else ""}
     return _show(call, {name: value for name, value in view.items() if value})
@@ -80,7 +80,7 @@ def waiting_page(
 def decide(call: Writer, form: Form) -> Response:
     """Decide about all chosen BOMs. Each decision is a separate change; what was not done is named.
 
-    Nothing is done before a person has seen the list of lines that it removes.
+    Nothing is done before a user has seen the list of lines that it removes.
     """
     action, reason = decision_of(form)
     chosen = list(dict.fromkeys(texts(form, "chosen")))
@@ -130,7 +130,7 @@ def undo(call: Writer, form: Form) -> Response:
 
 @router.post("/waiting/assign")
 def assign(call: Writer, form: Form) -> Response:
-    """Give the chosen BOMs to a person, or to nobody in particular."""
+    """Give the chosen BOMs to a user, or to no one in particular."""
     chosen = list(dict.fromkeys(value.rpartition(" ")[0] for value in texts(form, "chosen")))
     who, view = text(form, "assignee", 64), _view_of(form)
     if not chosen:

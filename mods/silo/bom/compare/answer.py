@@ -30,7 +30,7 @@ def summary(diff: BomDiff) -> str:
 
 
 def resolve_url(part_number: str) -> str:
-    """Return the page where a person decides about what a merge left open."""
+    """Return the page where a reviewer decides about what a merge left open."""
     return f"/items/{quote(part_number, safe='')}/bom"
 
 
@@ -76,7 +76,7 @@ def answer_of(
 
 
 def conflict_warning(change: QuantityChange) -> dict[str, Any]:
-    """Make the warning about a line whose quantity a person set, and which differs from the assembly's."""
+    """Make the warning about a line whose quantity a user set, and which differs from the assembly's."""
     cad, ours = plain(change.local_quantity), plain(change.remote_quantity)
     kept = change.on_server(str(ours))
     return {

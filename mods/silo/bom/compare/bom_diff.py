@@ -74,7 +74,7 @@ class BomDiff:
     removed            assembly line, not in the assembly now      → stays, flagged unreferenced
     unchanged          both, same quantity                         → nothing
     manual             lines that people own                       → never touched, listed apart
-    conflicts          in the assembly, and manual with another quantity → a person decides
+    conflicts          in the assembly, and manual with another quantity → a user decides
     kept               lines of components that are missing now        → stay as they are
     """
 
@@ -96,7 +96,7 @@ class BomDiff:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """Make findings of what the comparison leaves to a person; :meth:`findings_at` adds the place."""
+        """Make findings of what the comparison leaves to a user; :meth:`findings_at` adds the place."""
         return self.findings_at()
 
     def findings_at(self, parent: BomEntry | None = None) -> tuple[Finding, ...]:

@@ -25,7 +25,7 @@ def is_generic(label: str) -> bool:
 def proposed_name(entry: BomEntry, *, shares_file: bool = False) -> str:
     """Return the document's label (spec §2), the object's if it says more, or the file's name.
 
-    FreeCAD makes a document's label from its file's name; only a label that a person chose (it differs) comes
+    FreeCAD makes a document's label from its file's name; only a label that a user chose (it differs) comes
     before an object's own label. If a file gives several components, the object's label decides.
     """
     if entry.standard:

@@ -22,9 +22,9 @@ class Proposal:
     shares_file
         its file gives other components too.
     is_guess
-        the category was found by little: a person has to look at it first.
+        the category was found by little: a user has to look at it first.
     sourcing
-        "manufactured" or "purchased"; "" while nobody has said.
+        "manufactured" or "purchased"; "" while it is not stated.
     """
 
     entry: BomEntry

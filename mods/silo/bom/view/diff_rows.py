@@ -19,7 +19,7 @@ _TOLD = ("added", "quantity_changed", "conflicts", "removed", "kept", "manual")
 
 
 def diff_rows(diff: BomDiff) -> Iterator[tuple[str, str, str]]:
-    """Yield each line that differs or is a person's own: (field of the diff, part number, quantity in
+    """Yield each line that differs or is a user's own: (field of the diff, part number, quantity in
     words).
     """
     disputed = {change.part_number for change in diff.conflicts}

@@ -34,7 +34,7 @@ class ObjectRole(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Lost:
-    """What a broken link stands for: a component that nobody can look at.
+    """What a broken link stands for: a component that cannot be read.
 
     ``file`` and ``name`` as the link records them, the file in full. ``label`` is for people.
     """

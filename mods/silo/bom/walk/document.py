@@ -133,7 +133,7 @@ def object_name(obj: object) -> str:
     return f"{NAMELESS}{id(obj):x}"
 
 
-# A damaged or hostile file may hold megabytes; nobody reads more than this.
+# A damaged or hostile file may hold megabytes; no more than this is read.
 _LONGEST_LABEL = 300
 
 

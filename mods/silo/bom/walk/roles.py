@@ -239,7 +239,7 @@ class Reading:
         return tree
 
     def _is_closed(self, obj: Any, kind: Kind) -> bool:
-        """Return True if a person declared the inline container a component of its own."""
+        """Return True if a user declared the inline container a component of its own."""
         return kind in DECLARABLE and self._is_declared(obj)
 
     def _is_declared(self, obj: Any) -> bool:
@@ -264,7 +264,7 @@ class Reading:
         return known[1]
 
     def _is_own(self, target: Any) -> bool:
-        """Return True for geometry of this file that nobody declared a component."""
+        """Return True for geometry of this file that was not declared a component."""
         if not self._is_mine(target) or self._is_declared(target):
             return False
         return not self._reader.standard(target)[0]
@@ -489,7 +489,7 @@ class Reading:
         return next((taker for taker in takers if taker is not None), None)
 
     def _report_left_out(self, obj: Any, kind: Kind) -> None:
-        """Report what is left out by itself; not what is left out with its container, or what nobody buys."""
+        """Report what is left out by itself; not what its container leaves out, or what is never bought."""
         if kind in _COUNTABLE or kind in INLINE or kind in DECLARABLE:
             self._is_left_out(obj)
             self._holds_components |= kind is Kind.DRAFT_ARRAY or kind in COMPONENTS

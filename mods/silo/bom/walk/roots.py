@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Which object of a document is the assembly when nobody says, and what lies beside it.
+"""Which object of a document is the assembly if none is named, and what lies beside it.
 
 In this order: FreeCAD's own ``Assembly::AssemblyObject``, Assembly4's part of ``Type`` "Assembly", an
 Assembly3 container, the one top-level part that holds components, and else the document itself, with all that
@@ -350,7 +350,7 @@ def _roles_beside(
 def beside(top: Any, fates: Mapping[str, ObjectRole | None]) -> list[Any]:
     """Return the objects in the document of ``top`` that lie in no container or folder and hold components.
 
-    They are not counted, and perhaps nobody has noticed that. Another assembly has its own BOM.
+    They are not counted, and that may not have been noticed. Another assembly has its own BOM.
     """
     if isinstance(top, DocumentRoot):
         return []

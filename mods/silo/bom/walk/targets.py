@@ -361,8 +361,8 @@ def _member(holder: Any, name: str) -> Any:
 # --- an AssemblyLink's own ``Group`` ---
 #
 # Copies of what its assembly held when it was last recomputed. They are never counted. Where they differ
-# from the assembly as it is now, what a person sees is old (measured: opening and recomputing the parent does
-# not mend it, facts §1.4). Each copy points at the object that it stands for, except that FreeCAD 1.1 copies
+# from the assembly as it is now, what a user sees is old (measured: opening and recomputing the parent does
+# not help, facts §1.4). Each copy points at the object that it stands for, except that FreeCAD 1.1 copies
 # a link array as an array of its own of the same part (measured).
 
 
@@ -400,7 +400,7 @@ def stale_copies(link: Any, assembly: Any, key: Callable[[Any], Hashable]) -> tu
 
 
 def own_parts(link: Any, assembly: Any, key: Callable[[Any], Hashable]) -> list[Any]:
-    """Return what a person put into a flexible AssemblyLink: standard parts, and links that are no copies.
+    """Return what a user put into a flexible AssemblyLink: standard parts, and links that are no copies.
 
     A copy leads to an object of the assembly's file, most often a link. A link array of FreeCAD 1.1 leads to
     the part itself, so an array is taken for a copy.

@@ -73,7 +73,7 @@ def run_bom_diff(args: argparse.Namespace) -> int:
         print_json(_changes_json(changes, old, new))
     else:
         _show_changes(changes, old, new)
-    # An old state that is damaged cannot be mended any more; a new one can.
+    # An old state that is damaged cannot be repaired any more; a new one can.
     return Exit.UNDONE if not new.complete or (args.check and changes) else Exit.DONE
 
 

@@ -27,7 +27,7 @@ def add_relink(parser: argparse.ArgumentParser) -> None:
 
 
 def run_relink(args: argparse.Namespace) -> int:
-    """Mend the links; returns 2 if no link records OLD, or if NEW does not hold what they want."""
+    """Repair the links; returns 2 if no link records OLD, or if NEW does not hold what they want."""
     from silo.fcstd.relink import Relinked, relink
 
     folder = os.path.dirname(os.path.realpath(args.top))
@@ -85,7 +85,7 @@ def _documents(top: str) -> list[str]:
     """List the files of the tree that can be read."""
     try:
         extraction = read_assembly(top)
-    except SiloError:  # such as no assembly in the file: its own links can be mended anyway
+    except SiloError:  # such as no assembly in the file: its own links can be repaired anyway
         return [top]
     entries = walk_entries(extraction.entries)
     return [top, *(entry.doc_path for entry in entries if not entry.missing and entry.doc_path)]

@@ -68,7 +68,7 @@ def run_mass(args: argparse.Namespace) -> int:
     materials = material_table(args)
     assembly = read_model(args.top, args, object_name=args.assembly, hardware=not args.no_hardware)
     name = assembly.name or "assembly"
-    # A FreeCAD document is its own BOM: where it states no material, nobody does.
+    # A FreeCAD document is its own BOM: where it states no material, nothing does.
     options = Options(
         args.default_density or 1000.0,
         step_density=True,

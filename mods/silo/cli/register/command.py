@@ -154,7 +154,7 @@ def _read(args: argparse.Namespace) -> tuple[Extraction, frozenset[str], bool]:
 
 
 def _tell_missing(extraction: Extraction, base: str) -> bool:
-    """Report the missing files, which nobody can register."""
+    """Report the missing files, which cannot be registered."""
     from silo.cli.terminal import plain
 
     missing = {entry.doc_path for entry in walk_entries(extraction.entries) if entry.missing}

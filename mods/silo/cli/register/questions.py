@@ -34,7 +34,7 @@ Nothing is registered before the last question. Ctrl-C leaves everything as it w
 
 
 def read_line(prompt: str) -> str | None:
-    """Ask a person for a line; None at the end of the input. Asks on stderr, since standard output may be
+    """Ask a user for a line; None at the end of the input. Asks on stderr, since standard output may be
     JSON.
     """
     set_step("")

@@ -60,7 +60,7 @@ class RegisterRun:
         self.done: list[Registration] = []
 
     def as_asked(self, rows: Sequence[TableRow], unused: frozenset[str]) -> int:
-        """Register with a table, with --yes, or with the answers of a person."""
+        """Register with a table, with --yes, or with the answers of a user."""
         if self.args.plan:
             return self.write_plan(unused)
         if self.args.apply:

@@ -99,7 +99,7 @@ def run_login(args: argparse.Namespace) -> int:
 
 
 def _token_by_browser(args: argparse.Namespace) -> str:
-    """Let a person allow a new token on the server's page, and return it; "" without a terminal or such a
+    """Let a user allow a new token on the server's page, and return it; "" without a terminal or such a
     page.
     """
     if args.paste or not sys.stdin.isatty():

@@ -54,7 +54,7 @@ class MassColumns:
     masses
         role → its header.
     unused
-        columns that may hold masses by their headers, and whose role nobody knows.
+        columns that may hold masses by their headers, and whose role is unknown.
     exact
         masses are written in full (Silo's own export does so): a short one was not rounded.
     """

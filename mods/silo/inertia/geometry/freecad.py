@@ -46,7 +46,7 @@ from silo.inertia.materials.densities import DENSEST, LIGHTEST, parse_density
 from silo.inertia.notes import GeometryCode, Note
 
 NO_MATERIAL = "7f9fd73b-50c9-41d8-b7b2-575a030c1eeb"
-"""FreeCAD's "Default": what every untouched part has. Its 1 kg/m^3 is nobody's density."""
+"""FreeCAD's "Default": what every untouched part has. Its 1 kg/m^3 is no density that was chosen."""
 
 
 @dataclass(frozen=True)

@@ -136,7 +136,7 @@ class Helpers:
                 done(number + 1, len(rows))
                 results[number] = here(rows[number])
         for future in working:
-            # A helper that is still loading the kernel has nothing left to do, so nobody waits for it.
+            # A helper that is still loading the kernel has nothing left to do, so it is not waited for.
             if not future.cancel():
                 future.result()
         return [results[n] if n in results else here(row) for n, row in enumerate(rows)]

@@ -107,7 +107,7 @@ def mesh_scene(path: Path, kind: Format) -> MeshScene:
     try:
         # Infinite coordinates are refused below, with a message; numpy's warning would be about trimesh.
         with path.open("rb") as stream, np.errstate(all="ignore"):
-            # Unprocessed, since we report what trimesh would mend without a word.
+            # Unprocessed, since we report what trimesh would repair without a word.
             loaded = trimesh.load_scene(stream, file_type=kind.value, process=False)
     except MemoryError:
         raise

@@ -57,7 +57,7 @@ def density_factor(unit: str) -> float | None:
 
 
 def read_density(text: str, factor: float = 1.0, *, points_are_decimal: bool = False) -> DensityCell:
-    """Read a density that a person wrote: "7.85 g/cm³", "7850". ``factor``: for a number without a unit.
+    """Read a density that a user wrote: "7.85 g/cm³", "7850". ``factor``: for a number without a unit.
 
     "7,850 g/cm3" is 7.85, since nothing is denser than a metal; "7,850 kg/m3" is refused, and both readings
     are named. A density that no solid has is refused.

@@ -37,7 +37,7 @@ class MaterialMiss:
     """A material text that was not understood, and why, in words that end a sentence.
 
     nearest
-        the material that it may mean, for a person to decide; None if nothing is near.
+        the material that it may mean, for a user to decide; None if nothing is near.
     """
 
     reason: str

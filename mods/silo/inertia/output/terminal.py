@@ -89,7 +89,7 @@ def _is_one_body(report: InertiaReport) -> bool:
 def report_warnings(report: InertiaReport, *, whole: bool = False, say: Say = str) -> Text:
     """Write the warnings for a terminal, a line for each cause: mass at stake, parts, the first message.
 
-    ``whole``: with all places; ``say`` says them in the language of a person.
+    ``whole``: with all places; ``say`` says them in the language of a user.
     """
     if not report.warnings:
         return Text(say("No warnings."), style="green")

@@ -19,7 +19,7 @@ def write_whole(path: Path | str, data: bytes, *, like: Path | str | None = None
     target = Path(os.path.realpath(path))
     try:
         if target.exists() and not target.is_file():
-            # A pipe or a device cannot be replaced, and need not be: nobody reads it twice.
+            # A pipe or a device cannot be replaced, and need not be: it is not read twice.
             target.write_bytes(data)
             return
         with replacing(target, mode=_mode(target if like is None else Path(like))) as file:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from silo.inertia.codes import Decided, Source
 from silo.inertia.report import InertiaReport, LinkResult, PartResult, PartWarning
 
-# Says a finished sentence in the language of a person, as ``silo.spoken`` does.
+# Says a finished sentence in the language of a user, as ``silo.spoken`` does.
 Say = Callable[[str], str]
 
 NOISE = 1e-9

@@ -61,7 +61,7 @@ def of_sent(sent: Sent, page: Page, now: float | None = None) -> PaneEntry:
 
 
 def _batch_of(sent: Sent, tone: Tone) -> EntryBatch | None:
-    """Return the batch to which a commit belongs if it has nothing that a person must see; otherwise None."""
+    """Return the batch to which a commit belongs if it has nothing that a user must see; otherwise None."""
     quiet = tone not in (Tone.WARNING, Tone.ERROR)
     return EntryBatch.COMMITTED if quiet and sent.status not in (Status.MERGED, Status.BLOCKED) else None
 
@@ -141,7 +141,7 @@ def _status_lines(sent: Sent) -> tuple[EntryLine, ...]:
 
 
 def _blocked_actions(path: str, missing: int) -> tuple[Action, ...]:
-    """Return what a person can do about missing components; only these may be left out of a BOM."""
+    """Return what a user can do about missing components; only these may be left out of a BOM."""
     if not missing:
         return ()
     singular, many = translate("Silo", "Sync without it"), translate("Silo", "Sync without them")
@@ -199,7 +199,7 @@ def _finding_lines(resolved: Resolved, base: str) -> list[EntryLine]:
 
 
 def finding_actions(finding: Finding, resolved: Resolved) -> tuple[Action, ...]:
-    """Return what a person can do about a finding: see the objects, or decide about a copied identity."""
+    """Return what a user can do about a finding: see the objects, or decide about a copied identity."""
     top = resolved.assembly.doc_path
     if finding.code is FindingCode.COPIED_IDENTITY:
         files = tuple(dict.fromkeys(place.doc_path for place in finding.where))

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Choice(StrEnum):
-    """What a person wants to be done about a file that a colleague has changed."""
+    """What a user wants to be done about a file that a colleague has changed."""
 
     LEAVE = "leave"  # leave mine out of this commit
     OPEN = "open"  # open theirs beside mine
@@ -42,7 +42,7 @@ class Theirs:
     part_number, revision
         theirs in Silo; "" and 0 where it is only the file on disk that is another one.
     base
-        the number of the revision that mine was made from; None where nobody knows.
+        the number of the revision that mine was made from; None if it is unknown.
     lines
         the BOM base → theirs → mine, for assemblies.
     """

@@ -16,7 +16,7 @@ Look = Callable[[Callable[[Mapping[str, Theirs]], None]], object]
 
 @dataclass(frozen=True)
 class CommitAnswer:
-    """What a person says in the commit dialog.
+    """What a user says in the commit dialog.
 
     register
         give it a part number as well.
@@ -34,7 +34,7 @@ class CommitDesk(Desk, Protocol):
     """The desk as a commit needs it."""
 
     def save_as(self, doc: Any, /) -> None:
-        """Let a person give a document its first name."""
+        """Let a user give a document its first name."""
 
     def ask(self, planned: CommitPlan, note: str, comment: str, look: Look, /) -> CommitAnswer | None:
         """Ask which documents to commit, and with which comment; None if the person cancels.

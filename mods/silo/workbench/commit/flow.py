@@ -3,7 +3,7 @@
 
 ::
 
-    start ── plan ──▶ ask a person ──▶ turns: one document each ──▶ outbox (a worker)
+    start ── plan ──▶ ask a user ──▶ turns: one document each ──▶ outbox (a worker)
              refused: warn   └ no: nothing happens      └ a failure: a box, and the next document
 
 Each document has a turn of the event loop of its own, so that the window stays alive between them. FreeCAD
@@ -67,7 +67,7 @@ class CommitFlow:
         self.choose = choose
         self._turns: deque[tuple[Iterator[CommittedDocument], str]] = deque()
         self._asked_for: set[str] = set()
-        # Path → what a person wrote about a file that has no item yet.
+        # Path → what a user wrote about a file that has no item yet.
         self._comments: dict[str, str] = {}
         # Files without an item that are sent as documents once they are saved.
         self._documents: set[str] = set()
@@ -78,11 +78,11 @@ class CommitFlow:
         return bool(self._turns)
 
     def was_asked_for(self, key: str) -> bool:
-        """Return True if a person committed this very document, not one above it."""
+        """Return True if a user committed this very document, not one above it."""
         return key in self._asked_for
 
     def snapshot(self, doc: Any) -> Snapshot:
-        """Take a snapshot of a document, without findings that a person has decided already (files that are
+        """Take a snapshot of a document, without findings that a user has decided already (files that are
         one part).
         """
         taken = self._desk.snapshot(doc)
@@ -223,7 +223,7 @@ class CommitFlow:
         yield from ()
 
     def comment_of(self, path: str) -> str:
-        """Return what a person wrote about a file when it had no item yet, and forget it."""
+        """Return what a user wrote about a file when it had no item yet, and forget it."""
         return self._comments.pop(path, "")
 
     def _heard(self, planned: CommitPlan) -> bool:
@@ -286,7 +286,7 @@ class CommitFlow:
     def sync_only(self, doc: Any, *, by_fork: bool = False, allow_missing: bool = False) -> None:
         """Sync the BOM of a document whose file is committed already: its parts were registered, or a
         question about them was answered. ``by_fork``: a fork's ``Origin_Commit`` did it, in its own way.
-        ``allow_missing``: a person wants it without the missing components.
+        ``allow_missing``: a user wants it without the missing components.
         """
         try:
             taken = self.snapshot(doc)

@@ -40,9 +40,9 @@ class DocumentRow:
     replaced
         somebody else has written the file since the document was opened: saving it would undo that.
     on_top
-        the colleague's revision that a person saw and commits this on top of; empty where there is none.
+        the colleague's revision that a user saw and commits this on top of; empty where there is none.
     is_new
-        the file has only just got its item, at a person's word: nobody's newer revision is looked for.
+        the file has only just got its item, at a user's word: no newer revision is looked for.
     lost
         the objects that saving it here would destroy.
     """
@@ -120,7 +120,7 @@ class CommitPlan:
 
     @property
     def wanted(self) -> tuple[DocumentRow, ...]:
-        """Return the rows that are committed unless a person decides otherwise."""
+        """Return the rows that are committed unless a user decides otherwise."""
         return tuple(row for row in self.rows if row.wanted)
 
     @property

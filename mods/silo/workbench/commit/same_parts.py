@@ -28,7 +28,7 @@ class Decisions:
         write_memory(self._path, accepted)
 
     def without_accepted(self, extraction: Extraction) -> Extraction:
-        """Remove the copied-identity findings that a person has accepted."""
+        """Remove the copied-identity findings that a user has accepted."""
         if not any(f.code is FindingCode.COPIED_IDENTITY for f in extraction.findings):
             return extraction
         accepted_now = self._read()

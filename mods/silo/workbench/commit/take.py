@@ -77,7 +77,7 @@ def _take(
     if one_path(row.document.FileName) != row.path:
         text = "it was saved under another name since this commit was asked for; commit it again"
         raise DocumentError(row.path, text)
-    # What somebody else has written is no file of ours: ours is written again, at a person's word. What
+    # What somebody else has written is no file of ours: ours is written again, at a user's word. What
     # was edited while documents before it were saved goes along: the BOM is that of the file.
     if row.state is not DocumentState.SAVED or base.replaced or is_edited(documents, row.document):
         if base.replaced and not row.replaced:

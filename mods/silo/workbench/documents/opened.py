@@ -42,7 +42,7 @@ class DocumentOrigin:
     stamp
         the file as this document read or wrote it last; None where there was none.
     content
-        its SHA-256; "" while nobody has looked yet.
+        its SHA-256; "" while it was not looked at.
     since
         seconds of :func:`time.monotonic`: when it was opened, or committed last.
     """

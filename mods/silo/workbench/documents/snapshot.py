@@ -64,7 +64,7 @@ def take(doc: Any, *, assembly: Any = None, walk: Walk = extract) -> Snapshot:
     """Take a snapshot of an open document.
 
     assembly
-        the container in which a person works, if it is known; it decides if the document holds several.
+        the container in which a user works, if it is known; it decides if the document holds several.
     walk
         returns the BOM of a container (:func:`silo.workbench.freecad.live.extract_object`).
     """

@@ -89,7 +89,7 @@ class CommitHook:
             self.note(doc, committed=False)
 
     def slotActivateDocument(self, _doc: Any) -> None:
-        """Look again when a person changes to another document."""
+        """Look again when a user changes to another document."""
         # The document is not the active one yet while FreeCAD reports it.
         self._later(0, self._wrap_origin)
 

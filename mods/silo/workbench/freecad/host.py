@@ -2,7 +2,7 @@
 """FreeCAD, seen through plain functions: the only file that imports ``FreeCAD`` and ``FreeCADGui``.
 
 Everything here belongs in FreeCAD's main thread, except the console functions. Behaviour that differs
-between FreeCAD 0.20, 1.0 and 1.1 was measured and is handled here, so that nobody else needs to know it.
+between FreeCAD 0.20, 1.0 and 1.1 was measured and is handled here, so that no other module needs to know it.
 Imported at FreeCAD's start: what only some functions need, they import themselves.
 """
 
@@ -234,7 +234,7 @@ def is_object(value: Any) -> bool:
 
 
 def active_document() -> Any:
-    """Return the document in which a person works; None if there is none."""
+    """Return the document in which a user works; None if there is none."""
     return FreeCAD.ActiveDocument
 
 
@@ -291,7 +291,7 @@ def close_document(doc: Any) -> None:
 
 
 def close_all() -> None:
-    """Close every document without saving; for batches, never while a person works."""
+    """Close every document without saving; for batches, never while a user works."""
     for name in list(FreeCAD.listDocuments()):
         # Closing one document may close others that only it had loaded.
         if name in FreeCAD.listDocuments():

@@ -41,7 +41,7 @@ def remove_identity(doc: Any, name: str, *, no_part: bool = False, whole_documen
     """Remove the identity of one object from every place. The caller saves.
 
     no_part
-        the object gets ``SiloBomExclude``, since a person decided that it is no part. Otherwise the property
+        the object gets ``SiloBomExclude``, since a user decided that it is no part. Otherwise the property
         is removed.
     whole_document
         the document's own identity is removed too; otherwise it stays.

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 class LossGuard:
     """A document observer: nothing of a newer FreeCAD's file is lost without a question.
 
-    FreeCAD lets nobody stop a save. So the newer file is kept before it, and if the person says so it is put
-    back after it; then the document has edits that are not on disk, and what was saved is kept aside.
+    A save in FreeCAD cannot be stopped. So the newer file is kept before it, and if the user says so it is
+    put back after it; then the document has edits that are not on disk, and what was saved is kept aside.
 
     outbox
         gives the store, which keeps copies.

@@ -57,7 +57,7 @@ def others_unmarked(doc: Any = None) -> Iterator[None]:
 
     FreeCAD marks each document that links to a saved one, because it keeps the time of saving of that (0.20
     does so whatever we do), and each document that shows an axis cross, because the size of the cross
-    changes. Nobody edited them.
+    changes. They were not edited.
     """
     clean = [other for other in host.documents() if other != doc and not is_modified(other)]
     if not host.has_gui():

@@ -144,8 +144,8 @@ def _meshes(doc: Any, names: Iterable[str]) -> Iterable[_Triangles]:
 
 
 def _node(mesh: _Triangles, colour: str, clear: float, through: bool) -> Any:
-    """Make a node that shows triangles [mm]; with ``through``, also behind other objects. Nobody can
-    pick it.
+    """Make a node that shows triangles [mm]; with ``through``, also behind other objects. It cannot
+    be picked.
     """
     from pivy import coin
 

@@ -14,7 +14,7 @@ from silo.workbench.freecad.stored_links import stored_sub_name
 
 
 def relink(finding: Finding) -> list[str]:
-    """Set the links that a finding names to the file that it says was meant; labels of what was mended.
+    """Set the links that a finding names to the file that it says was meant; labels of what was repaired.
 
     Makes one undo step per document. Raises DocumentError if the file lacks an object that a link wants; then
     nothing is changed.
@@ -27,7 +27,7 @@ def relink(finding: Finding) -> list[str]:
         link = document.getObject(place.obj) if document is not None else None
         problem = inspect(link) if link is not None else None
         if link is None or problem is None or located(problem.file, document.FileName) != finding.file:
-            continue  # mended meanwhile
+            continue  # repaired meanwhile
         mended.append((link, _target(meant, problem), stored_sub_name(link)))
     for document in {link.Document.Name: link.Document for link, _, _ in mended}.values():
         document.openTransaction("Silo: relink")

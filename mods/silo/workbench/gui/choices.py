@@ -89,7 +89,7 @@ class ChoiceDelegate(QtWidgets.QStyledItemDelegate):  # type: ignore[misc]  # Py
             model.setData(index, key, QtCore.Qt.ItemDataRole.UserRole)
 
     def paint(self, painter: Any, option: Any, index: Any) -> None:
-        """Paint the text, and an arrow if a person can choose."""
+        """Paint the text, and an arrow if a user can choose."""
         super().paint(painter, option, index)
         if not index.flags() & QtCore.Qt.ItemFlag.ItemIsEditable:
             return

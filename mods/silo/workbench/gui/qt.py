@@ -89,7 +89,7 @@ def tell_at_pointer(text: str) -> None:
 
 
 def ask_where_to_save(parent: Any, title: str, name: str) -> str:
-    """Let a person choose a path for a new file; "" if they choose none."""
+    """Let a user choose a path for a new file; "" if they choose none."""
     return str(QtWidgets.QFileDialog.getSaveFileName(parent, title, name)[0])
 
 

@@ -32,7 +32,7 @@ class WaitingRow:
     """One entry.
 
     urgent
-        a person has to look at it.
+        a user has to look at it.
     since
         seconds since 1970.
     details, more
@@ -58,7 +58,7 @@ def rows(
     said: str = "",
     pause: Pause | None = None,
 ) -> tuple[WaitingRow, ...]:
-    """Make a row of each entry; those that need a person come first.
+    """Make a row of each entry; those that need a user come first.
 
     said
         the reason that the pane shows above them; no row repeats it.
@@ -69,7 +69,7 @@ def rows(
 
 
 def can_send(entries: Iterable[QueueEntry], server_url: str) -> bool:
-    """Return True if *Send now* would send something: not all entries wait for a person, an address or
+    """Return True if *Send now* would send something: not all entries wait for a decision, an address or
     settings.
     """
     here = _address(server_url)
@@ -108,7 +108,7 @@ def _address(server_url: str) -> str:
 
 
 def _is_urgent(entry: QueueEntry, here: str) -> bool:
-    """Return True if the entry waits for a person, not for the server."""
+    """Return True if the entry waits for a decision, not for the server."""
     return entry.state is State.HELD or entry.is_away(here)
 
 

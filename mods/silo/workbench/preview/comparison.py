@@ -51,7 +51,7 @@ class Preview:
     page
         address of the assembly's BOM on the server.
     note
-        why it was made, where nobody asked for it.
+        why it was made, if it was not asked for.
     """
 
     snapshot: Snapshot

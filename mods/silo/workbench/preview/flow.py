@@ -67,7 +67,7 @@ class PreviewFlow:
         self._to_mend: set[str] = set()
 
     def start(self, doc: Any, *, mend: bool = False) -> None:
-        """Compare a document's assembly with the server; ``mend``: first mend its broken links, if a file
+        """Compare a document's assembly with the server; ``mend``: first repair its broken links, if a file
         fits.
         """
         taken = self._take(doc)

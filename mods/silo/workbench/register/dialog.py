@@ -39,11 +39,11 @@ from silo.workbench.words import plain, spoken, tip, told_apart, translate, visi
 if TYPE_CHECKING:
     from silo.workbench.register.flow import RegisterFlow
 
-# Rows have buttons, and nobody decides on a thousand parts at once; the next ones come after these.
+# Rows have buttons, and no user decides on a thousand parts at once; the next ones come after these.
 MOST_ROWS = 400
 
 COMPONENT, NAME, SOURCE, SUPPLIER, SUPPLIER_NUMBER, TYPE, CATEGORY, NUMBER, NOTE, BUTTON, NO_PART = range(11)
-# What a person may write or choose in a cell: column → the attribute of the row.
+# What a user may write or choose in a cell: column → the attribute of the row.
 _CELLS = {
     NAME: "name",
     SOURCE: "sourcing",
@@ -410,7 +410,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         return [row for place, row in pairs if not self.table.isRowHidden(place)]
 
     def selected(self) -> list[EditedRow]:
-        """Return the rows that a person has selected, from the top."""
+        """Return the rows that a user has selected, from the top."""
         places = sorted({index.row() for index in self.table.selectionModel().selectedRows()})
         chosen = [self._rows[self._row_at[place]] for place in places if place in self._row_at]
         visible = self._visible()
@@ -536,7 +536,7 @@ def _button_text(row: EditedRow) -> str:
 
 
 def _flags(row: EditedRow, column: int) -> Any:
-    """Return what a person can do with a cell, as Qt's flags."""
+    """Return what a user can do with a cell, as Qt's flags."""
     flag = QtCore.Qt.ItemFlag
     flags = flag.ItemIsEnabled | flag.ItemIsSelectable
     is_supply = column in (SUPPLIER, SUPPLIER_NUMBER)

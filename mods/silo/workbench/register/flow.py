@@ -3,7 +3,7 @@
 
 ::
 
-    start ── a worker looks ──▶ the dialog is filled ──▶ a person orders ──▶ a worker registers, one by one
+    start ── a worker looks ──▶ the dialog is filled ──▶ a user orders ──▶ a worker registers, one by one
                                        ▲                                          │ identities: GUI thread
                                        ╰─────────────── next numbers ◀── commits ◀┘
 
@@ -125,7 +125,7 @@ class RegisterFlow:
         self._last.pop(path, None)
 
     def ask_again(self, on: bool) -> None:
-        """Set if a person wants to be asked after each commit."""
+        """Set if a user wants to be asked after each commit."""
         self._preferences.set("AskRegister", on)
 
     def _with_dialog(self, path: str, call: Callable[[RegisterWindow], None]) -> None:
@@ -146,7 +146,7 @@ class RegisterFlow:
         """Undo decisions about what is modelled in the assembly's file; an item stays.
 
         no_part
-            a person says that it is no part, and the file records that.
+            a user says that it is no part, and the file records that.
         """
         clean = self._desk.unedited()
         try:

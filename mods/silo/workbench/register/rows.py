@@ -60,7 +60,7 @@ class Filter(StrEnum):
     """Which rows are shown."""
 
     ALL = "all"
-    UNSURE = "unsure"  # a person has to look at them first
+    UNSURE = "unsure"  # a user has to look at them first
     NEW = "new"  # Silo has nothing like them
     DUPLICATES = "duplicates"  # Silo, or another row, has them probably
 
@@ -158,7 +158,7 @@ class EditedRow:
 
     @property
     def can_be_no_part(self) -> bool:
-        """Return True if a person can say that it is no part."""
+        """Return True if a user can say that it is no part."""
         return self.section == "modelled" and self.editable
 
     @property
@@ -205,7 +205,7 @@ class EditedRow:
 
     @property
     def guesses(self) -> bool:
-        """Return True while its category is a guess that nobody has looked at."""
+        """Return True while its category is a guess that was not looked at."""
         same = self.category == self.candidate.proposal.category
         return (
             self.candidate.proposal.is_guess and same and not (self.checked or self.finished or self.running)
@@ -346,7 +346,7 @@ def choose(rows: Sequence[EditedRow], row: EditedRow, number: str) -> None:
 
 
 def set_all(rows: Iterable[EditedRow], column: str, value: str, categories: Mapping[str, str]) -> None:
-    """Take over one value for all of these rows; a category that a person chose is no guess.
+    """Take over one value for all of these rows; a category that a user chose is no guess.
 
     column
         of :data:`silo.registering.request.CHOSEN`. In a name ``{name}`` is the present name, ``{n}`` counts.

@@ -217,7 +217,7 @@ class OpenDialog(_Window):
         self.items.resizeColumnToContents(0)
         self.say("" if items else translate("Silo", "Nothing found."))
         numbers = [item.part_number for item in items]
-        if items:  # what a person has chosen meanwhile stays chosen
+        if items:  # what a user has chosen meanwhile stays chosen
             place = numbers.index(chosen) if chosen in numbers else 0
             self.items.setCurrentItem(self.items.topLevelItem(place))
 
@@ -503,6 +503,6 @@ def mark_in_tree(states: Mapping[str, tuple[str, Tone]]) -> None:
 
 
 def ask_folder(parent: Any, start: str) -> str:
-    """Let a person choose a folder; "" if they choose none."""
+    """Let a user choose a folder; "" if they choose none."""
     title = translate("Silo", "Choose a folder")
     return str(QtWidgets.QFileDialog.getExistingDirectory(parent, title, start))

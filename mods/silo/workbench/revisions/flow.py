@@ -65,7 +65,7 @@ class RevisionFlow:
     def choose(
         self, path: str, theirs: Theirs, choice: Choice, *, taken: Callable[[], object] = lambda: None
     ) -> None:
-        """Carry out what a person chose in the commit dialog or in the pane.
+        """Carry out what a user chose in the commit dialog or in the pane.
 
         taken
             called when their file is in the place of mine.

@@ -179,7 +179,7 @@ class ProjectFlow:
         self._commits.commit_folder(self.view.root, paths & self._edited(), comment)
 
     def decide(self, row: ProjectRow, choice: Choice) -> None:
-        """Do what a person chose about a file that is newer in Silo."""
+        """Do what a user chose about a file that is newer in Silo."""
         if choice is Choice.ON_TOP:
             if row.edits:
                 self._commits.commit_folder(self.view.root, (row.path,), "")

@@ -72,7 +72,7 @@ class Session:
         self._rows = Worker("silo-rows", deliver, on_bug=bug)
         self._disk = Worker("silo-disk", deliver, on_bug=bug)
         self._net = Worker("silo-network", deliver, on_busy=self._busy, on_bug=bug)
-        # What a person waits for on the preference page must not queue behind a long upload.
+        # What a user waits for on the preference page must not queue behind a long upload.
         self._aside = Worker("silo-aside", deliver, on_bug=bug)
         self._looks = Worker("silo-looks", deliver, on_bug=bug)
         self._models = Worker("silo-models", deliver, on_bug=bug)
@@ -288,7 +288,7 @@ class Session:
             self.send(force=False)
 
     def retry(self, entry_id: int) -> None:
-        """Send again an entry that waited for a person."""
+        """Send again an entry that waited for a decision."""
         self._change(lambda: self.outbox.retry(entry_id), send=True)
 
     def send_here(self, entry_ids: Iterable[int]) -> None:
@@ -385,7 +385,7 @@ class Session:
         self._aside.submit(Job(title, work, done=done, failed=failed))
 
     def look(self, work: Callable[[], object]) -> None:
-        """Read files in a worker; nobody waits for the result."""
+        """Read files in a worker; the result is not waited for."""
         self._looks.submit(Job("Reading files", lambda _control: work()))
 
     def newer_than(self, identity: str, since: float) -> Newer | None:
@@ -409,7 +409,7 @@ class Session:
 
         wait
             gets a function that waits for so many seconds and returns how many files are still to be written;
-            ``wait`` ends when there are none, or when a person does not want to wait any longer.
+            ``wait`` ends when there are none, or when a user does not want to wait any longer.
         """
         self._net.cancel()
         if self._unfinished(0.0):
@@ -425,7 +425,7 @@ class Session:
 
     @property
     def idle(self) -> bool:
-        """Return True if no worker has work that a person waits for."""
+        """Return True if no worker has work that a user waits for."""
         return self._rows.idle and self._disk.idle and self._net.idle and self._aside.idle
 
     # -- what is shown ----------------------------------------------------------------------------------

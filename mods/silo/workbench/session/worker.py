@@ -25,7 +25,7 @@ Deliver = Callable[[Callable[[], None]], None]
 
 @dataclass(frozen=True)
 class Busy:
-    """What a worker is doing, for a progress bar. ``fraction`` is None where nobody can say."""
+    """What a worker is doing, for a progress bar. ``fraction`` is None if it is unknown."""
 
     title: str
     detail: str = ""
@@ -202,7 +202,7 @@ def in_gui(deliver: Deliver, call: Callable[[], Any], control: Control) -> Any:
 
     deliver(run)
     while not finished.wait(0.2):
-        # A person who closes FreeCAD, or presses Stop, must not wait for the GUI thread to have time.
+        # A user who closes FreeCAD, or presses Stop, must not wait for the GUI thread to have time.
         control.check()
     if problem:
         raise problem[0]

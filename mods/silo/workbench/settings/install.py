@@ -111,7 +111,7 @@ class InstallWindow(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
     def _work(self) -> None:
         try:
             text, done = self._install(), True
-        except Exception as error:  # noqa: BLE001  # a person wants to read it, whatever it is
+        except Exception as error:  # noqa: BLE001  # a user wants to read it, whatever it is
             text, done = str(error) or type(error).__name__, False
         self._relay.post(lambda: self._ended(text, done=done))
 

@@ -25,7 +25,7 @@ DEFAULTS: Mapping[str, str | bool] = {
     "ProjectFolder": "",
     # The BOM sync after a commit; the file revision is uploaded in any case.
     "SyncBom": True,
-    # HOLD: a BOM with a broken link waits until the link is mended. ALLOW: it is synced without it.
+    # HOLD: a BOM with a broken link waits until the link is repaired. ALLOW: it is synced without it.
     "MissingLinks": HOLD,
     # Standard parts of the Fasteners workbench are components.
     "CountHardware": True,

@@ -28,7 +28,7 @@ _PLACEHOLDER = re.compile(
 def take_configured_token(tx: Tx, user_id: int, secret: str) -> str:
     """Make the secret of the server's environment a token of the user, and revoke its predecessors.
 
-    Returns why it lets nobody in, or "" if it works. A token that was revoked stays revoked.
+    Returns why it lets no one in, or "" if it works. A token that was revoked stays revoked.
     """
     query = select(api_tokens, users.c.active).join(users, users.c.id == api_tokens.c.user_id)
     row = tx.conn.execute(query.where(api_tokens.c.token_hash == secret_hash(secret))).one_or_none()

@@ -25,7 +25,7 @@ def check_rate(tx: Tx, username: str, address: str) -> None:
     """Raise TooManyAttemptsError if the next try has to wait, longer after each failure.
 
     One name from one address waits soon. All names from one address, and one name from all addresses, wait
-    only if this name has never logged in from this address: so a stranger keeps nobody out.
+    only if this name has never logged in from this address: so a stranger keeps no user out.
     """
     window, allowed = tx.settings.login_window_seconds, tx.settings.login_failures
     name = login_attempts.c.username_key == username.casefold()[:64]

@@ -203,7 +203,7 @@ def create_token(
 
 
 def shown_prefix(secret: str) -> str:
-    """Return the part of a secret that may be shown; less of a secret chosen by a person."""
+    """Return the part of a secret that may be shown; less of a secret chosen by a user."""
     return secret[: min(9, len(secret) // 4)]
 
 

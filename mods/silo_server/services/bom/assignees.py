@@ -16,7 +16,7 @@ from silo_server.values import Item
 
 
 def assign(tx: Tx, part_number: str, username: str) -> None:
-    """Let a person settle what is open in a BOM; username "": nobody in particular."""
+    """Let a user settle what is open in a BOM; username "": no one in particular."""
     item = get_item(tx, part_number, lock=True)
     tx.conn.execute(delete(assignees).where(assignees.c.item_id == item.id))
     if username:
@@ -28,7 +28,7 @@ def assign(tx: Tx, part_number: str, username: str) -> None:
 
 
 def assignee_of(tx: Tx, item: Item) -> str:
-    """Return the name of the person who settles what is open in a BOM; "" if nobody in particular does."""
+    """Return the name of the person who settles what is open in a BOM; "" if no one in particular does."""
     query = select(users.c.username).join(assignees, assignees.c.user_id == users.c.id)
     return tx.conn.scalar(query.where(assignees.c.item_id == item.id)) or ""
 

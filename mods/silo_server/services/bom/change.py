@@ -32,8 +32,8 @@ class ChangeKind(StrEnum):
     """Why a BOM changed."""
 
     MERGE = "merge"  # an assembly was synced
-    EDIT = "edit"  # a person added, changed or removed lines
-    RESOLVE = "resolve"  # a person decided on unreferenced lines or conflicts
+    EDIT = "edit"  # a user added, changed or removed lines
+    RESOLVE = "resolve"  # a user decided on unreferenced lines or conflicts
     IMPORT = "import"  # a CSV was imported
     RESTORE = "restore"  # an earlier state was brought back
     UNDO = "undo"  # one change was taken back

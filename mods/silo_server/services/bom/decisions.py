@@ -34,7 +34,7 @@ from silo_server.values import Item, Line, LineState
 
 
 class ReviewAction(StrEnum):
-    """What a person decides about a line."""
+    """What a user decides about a line."""
 
     REMOVE = "remove"  # take it out of the BOM
     KEEP = "keep"  # keep it as an intentional, non-CAD line, with a reason

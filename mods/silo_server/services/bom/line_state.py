@@ -25,7 +25,7 @@ def state_to_json(state: LineState) -> dict[str, Any]:
 
 
 def mark_of(state: LineState, cad_quantity: float | None = None) -> str:
-    """Make a short mark of what a person saw of a line; another state has another mark.
+    """Make a short mark of what a user saw of a line; another state has another mark.
 
     cad_quantity
         the quantity in CAD that a conflict shows beside the line.

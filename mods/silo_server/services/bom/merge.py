@@ -224,8 +224,8 @@ def _as_mapping(line: Line) -> dict[str, Any]:
 
 
 def _overrides_gone(lines: Sequence[Line], numbers: set[str]) -> list[QuantityChange]:
-    # A person changed a quantity of a CAD line; now the assembly no longer has it. The line is theirs, so it
-    # stays, but silence would leave a part in the BOM that nobody needs.
+    # A user changed a quantity of a CAD line; now the assembly no longer has it. The line is theirs, so it
+    # stays, but silence would leave a part in the BOM that is not needed.
     return [
         QuantityChange(line.child_part_number, 0.0, line.state.quantity, line.unit or "")
         for line in lines

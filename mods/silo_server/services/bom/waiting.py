@@ -67,7 +67,7 @@ class Waiting(NamedTuple):
 
 
 def waiting(tx: Tx) -> list[Waiting]:
-    """Find all BOMs that wait for a person, by part number; archived assemblies never wait.
+    """Find all BOMs that wait for a decision, by part number; archived assemblies never wait.
 
     Reads only what a list of them is filtered and sorted by: there may be thousands.
     """

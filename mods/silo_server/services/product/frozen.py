@@ -83,7 +83,7 @@ def freeze(tx: Tx, item: Item) -> FrozenProduct:
             for line in graph.lines.get(item_id, ())
         ]
         below = (component.child_id for component in graph.components(item_id))
-        # A file may lie in the product without a link that leads to it, if a person uploaded it.
+        # A file may lie in the product without a link that leads to it, if a user uploaded it.
         files[item_id] = {**files[item_id], **{k: v for child in below for k, v in files[child].items()}}
         written = [files[item_id][document] for document in sorted(files[item_id])]
         text = dumps(_record(items[item_id], worths[item_id], written, beside.get(item_id, ()), lines))
@@ -279,7 +279,7 @@ def _worth_of(made: Mapping[str, Any]) -> MassAndCost:
 
 
 class Changes(NamedTuple):
-    """What changed in a product from one time to another. In frozen revisions nobody knows who did it."""
+    """What changed in a product from one time to another. In frozen revisions it is unknown who did it."""
 
     first: str
     last: str

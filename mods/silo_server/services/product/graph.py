@@ -41,7 +41,7 @@ class Graph:
         return None if said is None else said.quantity
 
     def doubts(self, line: Line) -> list[str]:
-        """List what a person still has to decide about a line, in words."""
+        """List what a user still has to decide about a line, in words."""
         quantity = self.cad_quantity(line)
         doubts = ["unreferenced"] if line.state.unreferenced_since else []
         if quantity is not None:

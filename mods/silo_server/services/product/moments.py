@@ -18,7 +18,7 @@ from silo_server.values import Item
 
 
 def moment(tx: Tx, item: Item, text: str, *, end: bool = False) -> str:
-    """Read the time that a person names: a date (its ``end``), a time, or a revision such as ``r3``.
+    """Read the time that a user names: a date (its ``end``), a time, or a revision such as ``r3``.
 
     Returns it as stored. Raises RejectedError; NotFoundError for a revision, frozen or not, that the item
     does not have.

@@ -37,7 +37,7 @@ class OpenBom(NamedTuple):
 
     @property
     def questions(self) -> str:
-        """Count what a person has to decide there, in words."""
+        """Count what a user has to decide there, in words."""
         counts = ((self.unreferenced, "unreferenced line"), (self.conflicts, "conflict"))
         words = [counted(count, word) for count, word in counts if count]
         return ", ".join([*words, f"{UNIT_OPEN} on {counted(self.units, 'line')}"] if self.units else words)
@@ -141,7 +141,7 @@ class Summary:
 
     @property
     def questions(self) -> int:
-        """Count the lines that wait for a person."""
+        """Count the lines that wait for a decision."""
         return sum(bom.unreferenced + bom.conflicts + bom.units for bom in self.open.values())
 
     @property
