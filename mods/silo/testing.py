@@ -35,10 +35,13 @@ from silo.api.wire import (
     Attachment,
     BomLine,
     Document,
+    HeldBom,
     HeldItem,
+    HeldReport,
     Item,
     KnownContent,
     LastSync,
+    LeftOutPart,
     MergeEvent,
     MergeRequest,
     MergeResult,
@@ -61,7 +64,7 @@ from silo.bom.errors import (
     RejectedError,
     VersionConflictError,
 )
-from silo.bom.left_out import Reason, remembered
+from silo.bom.left_out import Reason, remembered, what_holds
 from silo.bom.text import name_key
 from silo.bom.units import counts_pieces
 from silo.bom.walk.identity import as_uuid
@@ -623,6 +626,23 @@ class FakeSilo(FakeStore):
             if request.document is not None:
                 check_document(stored, request.document.revision, request.document.sha256)
             return self._merge(stored, request)
+
+    def hold_bom(
+        self, part_number: str, report: HeldReport, /, *, cancelled: Cancel | None = None
+    ) -> HeldBom:
+        stop_if(cancelled)
+        with self._changing("hold_bom"):
+            stored = self._stored(part_number)
+            last = stored.item.last_sync or LastSync()
+            file = report.document.file if report.document is not None else None
+            since = last.held.since if last.held is not None else self._clock()
+            held = HeldBom(since=since, user=self.user, left_out=report.left_out, document_file=file)
+            message = f"held by {self.user}: {what_holds(part.model_dump() for part in held.left_out)}"
+            gaps = [part for part in last.left_out if part.reason != Reason.HELD]
+            gaps.append(LeftOutPart(reason=Reason.HELD, message=message))
+            last = last.model_copy(update={"held": held, "left_out": gaps})
+            stored.item = stored.item.model_copy(update={"last_sync": last})
+            return held
 
     def _merge(self, stored: Stored, request: MergeRequest) -> MergeResult:
         number = stored.item.part_number

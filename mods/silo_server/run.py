@@ -147,7 +147,18 @@ def routers() -> tuple[APIRouter, ...]:
         tokens,
     )
     from silo_server.routes import users as user_routes
-    from silo_server.routes.bom import changes, exports, history, imports, lines, merge, review, summary, tree
+    from silo_server.routes.bom import (
+        changes,
+        exports,
+        held,
+        history,
+        imports,
+        lines,
+        merge,
+        review,
+        summary,
+        tree,
+    )
     from silo_server.web import pages
 
     return (
@@ -165,6 +176,7 @@ def routers() -> tuple[APIRouter, ...]:
         scene.router,
         lines.router,
         merge.router,
+        held.router,
         tree.router,
         summary.router,
         lines.several,

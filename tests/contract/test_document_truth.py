@@ -24,6 +24,7 @@ LINE = ("PUT", "line")
 ITEM = ("POST", "items")
 CHANGE = ("PUT", "item")
 MERGE = ("POST", "merge")
+HELD = ("POST", "held")
 RESTORE = ("POST", "restore")
 RELEASE = ("POST", "releases")
 ROWS: list[tuple[tuple[str, str], dict[str, Any], bool]] = [
@@ -89,6 +90,12 @@ ROWS: list[tuple[tuple[str, str], dict[str, Any], bool]] = [
     (MERGE, {"entries": [], "left_out": [{"reason": "missing", "name": NUL}]}, False),
     (MERGE, {"entries": [{"child_part_number": " ", "quantity": 1}]}, False),
     (MERGE, {"entries": [{"child_part_number": "LEAF", "quantity": 2e9}]}, False),
+    (HELD, {"left_out": [{"reason": "missing", "name": "Cover", "quantity": 2}]}, True),
+    (HELD, {"left_out": [{"reason": "broken"}], "document": {"file": "A.FCStd", "folder": None}}, True),
+    (HELD, {"left_out": []}, False),
+    (HELD, {"left_out": None}, False),
+    (HELD, {"left_out": [{"reason": ""}]}, False),
+    (HELD, {"left_out": [{"reason": "missing"}], "document": {}}, False),
     (("POST", "generate"), {"category": "F01"}, True),
     (("POST", "generate"), {"category": "0"}, False),
     (("POST", "users"), {"username": "fuzz.one", "password": None}, True),
@@ -110,6 +117,7 @@ BODIES = {
     "items": "NewItemBody",
     "item": "ItemChangeBody",
     "merge": "MergeRequest",
+    "held": "HeldReport",
     "generate": "NumberBody",
     "users": "NewUserBody",
     "user": "UserChangeBody",
@@ -146,6 +154,7 @@ def test_a_body_is_accepted_exactly_where_the_document_calls_it_valid(api: Api, 
             "item": f"/api/items/{parent}",
             "items": "/api/items",
             "merge": bom(parent, "merge"),
+            "held": bom(parent, "held"),
             "generate": "/api/generate-part-number",
             "users": "/api/users",
             "user": "/api/users/another",

@@ -93,6 +93,57 @@ def test_a_broken_link_holds_the_bom_back_unless_a_person_consents(vault: Vault,
     assert flagged == {"F01-0001": False, "M01-0001": consent}
 
 
+def held(vault: Vault) -> Any:
+    """What the server knows of a held BOM."""
+    return vault.silo.get_item(vault.number).last_sync.held
+
+
+def test_a_held_bom_is_known_here_and_there_until_it_goes_out(vault: Vault) -> None:
+    """Silo learns who holds it and why; when the file is back, the next commit of the BOM ends both."""
+    vault.commit(vault.snapshot(vault.part("Bolt", 4), broken=True))
+    vault.send()
+    (mine,) = vault.outbox.held_boms(vault.silo.base_url)
+    assert (mine.part_number, mine.why) == (vault.number, "1 open question")
+    assert mine.sentence == f"The BOM of {vault.number} is held here: 1 open question"
+    report = held(vault)
+    assert (report.user, [part.reason for part in report.left_out]) == (vault.silo.user, ["broken"])
+    vault.commit(vault.snapshot(vault.part("Bolt", 4)), content=None)
+    vault.send()
+    assert (held(vault), vault.outbox.held_boms()) == (None, ())
+    assert vault.lines() == {"F01-0001": 4}
+
+
+def test_the_reason_of_a_held_bom_is_the_newest_and_its_time_the_first(vault: Vault) -> None:
+    """Two commits without the file are one BOM that is held, since the first."""
+    for content in (b"one", b"two"):
+        vault.commit(vault.snapshot(vault.part("Bolt", 4), broken=True), content=content)
+        vault.send()
+    assert len(vault.outbox.held_boms()) == 1
+    assert [sent.status for sent in vault.told] == [Status.BLOCKED] * 2
+
+
+def test_a_held_bom_waits_until_the_server_has_heard_of_it(vault: Vault) -> None:
+    """The file has arrived; the report goes with the next run, or the server would show an old BOM as new."""
+    on(vault.silo, "hold_bom", DOWN)
+    vault.commit(vault.snapshot(vault.part("Bolt", 4), broken=True))
+    vault.send()
+    assert held(vault) is None
+    assert [entry.bom_left for entry in vault.waiting()] == [True]
+    well(vault.silo)
+    vault.send(force=True)
+    assert held(vault) is not None
+    assert (vault.waiting(), vault.files()) == ((), [b"top file"])
+
+
+def test_a_server_that_takes_no_report_leaves_it_here(vault: Vault) -> None:
+    """It refuses the report alone: the commit is done, and this computer remembers."""
+    on(vault.silo, "hold_bom", RejectedError("unknown"))
+    vault.commit(vault.snapshot(vault.part("Bolt", 4), broken=True))
+    vault.send()
+    assert vault.waiting() == ()
+    assert [each.why for each in vault.outbox.held_boms()] == ["1 open question"]
+
+
 def test_components_without_a_number_are_left_out_and_reported(vault: Vault) -> None:
     """The rest is synced."""
     stranger = vault.part("Stranger", identity="7f9fd73b-50c9-41d8-b7b2-575a030c1eeb")

@@ -14,6 +14,8 @@ from silo.api.transport import Cancel
 from silo.api.wire import (
     Answer,
     BomLine,
+    HeldBom,
+    HeldReport,
     LineTexts,
     MergeRequest,
     MergeResult,
@@ -204,6 +206,18 @@ class BomCalls(Caller):
             )
         except NotFoundError as error:
             raise self._what_is_missing(part_number, error) from error
+
+    def hold_bom(
+        self, part_number: str, report: HeldReport, /, *, cancelled: Cancel | None = None
+    ) -> HeldBom:
+        """Report that the BOM of an assembly cannot be sent, and why; the next merge takes it back.
+
+        Raises :class:`NotFoundError` for an unknown assembly and from a server that takes no such report.
+        """
+        subject = f"the held BOM of {part_number}"
+        where = (*_bom(part_number), "held")
+        reply = self._change("POST", subject, *where, body=report, repeatable=True, cancelled=cancelled)
+        return reply.model(HeldBom)
 
     def add_bom_line(self, part_number: str, child: str, /, **values: Any) -> BomLine:
         """Add a line by hand (``source`` manual): ``quantity``, ``unit``, ``notes``, ``find_number``, …

@@ -316,11 +316,21 @@ class LeftOutPart(Wire):
     message: str = ""
 
 
+class HeldBom(Answer):
+    """A BOM that waits on a designer's computer: since when, whose it is, and what holds it."""
+
+    since: Time = None
+    user: str = ""
+    left_out: list[LeftOutPart] = Field(default_factory=list)
+    document_file: str | None = None
+
+
 class LastSync(Answer):
-    """The last merge of an item's BOM: when (None: never), and what it left out."""
+    """The last merge of an item's BOM: when (None: never), and what it left out; ``held``: a later BOM."""
 
     at: Time = None
     left_out: list[LeftOutPart] = Field(default_factory=list)
+    held: HeldBom | None = None
 
 
 class SourceDocument(Wire):
@@ -350,6 +360,13 @@ class MergeRequest(Wire):
         # `dry_run` is ours; without it, the request is exactly the spec's.
         data: dict[str, Any] = write(self)
         return data if self.dry_run else {key: value for key, value in data.items() if key != "dry_run"}
+
+
+class HeldReport(Wire):
+    """``POST /api/items/{partNumber}/bom/held``: the client cannot send this BOM, and why."""
+
+    left_out: list[LeftOutPart]
+    document: SourceDocument | None = None
 
 
 class QuantityLine(Answer):

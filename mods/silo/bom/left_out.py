@@ -19,6 +19,7 @@ from typing import Any
 from silo.bom.entry import BomEntry
 from silo.bom.findings import Finding
 from silo.bom.items.naming import display_name
+from silo.bom.message import Message, counted_message, joined
 from silo.bom.view.folders import shorten
 from silo.bom.walk.document import relative
 from silo.bom.walk.standard import STANDARD_PARTS
@@ -31,6 +32,7 @@ class Reason(StrEnum):
     UNREGISTERED = "unregistered"  # it has no part number yet
     BROKEN = "broken"  # something else keeps the assembly from being read in full; see the message
     REFUSED = "refused"  # the server refused the merge; see the message
+    HELD = "held"  # the whole BOM waits on a designer's computer; see the message
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,3 +118,21 @@ def in_words(left_out: Sequence[LeftOut] | Sequence[Mapping[str, Any]]) -> str:
     reasons = Counter(str(out["reason"] if isinstance(out, Mapping) else out.reason) for out in left_out)
     parts = [f"{reasons.pop(reason)} {reason}" for reason in Reason if reason in reasons]
     return ", ".join([*parts, *(f"{count} {reason}" for reason, count in reasons.items())])
+
+
+def what_holds(left_out: Iterable[LeftOut] | Iterable[Mapping[str, Any]]) -> Message:
+    """Say what holds a BOM back: ``2 files missing``. Parts without a number hold no BOM back."""
+    reasons = Counter(str(out["reason"] if isinstance(out, Mapping) else out.reason) for out in left_out)
+    missing = reasons.pop(Reason.MISSING, 0)
+    reasons.pop(Reason.UNREGISTERED, 0)
+    other = reasons.total()
+    parts = [
+        *([counted_message(missing, "{n} file missing", "{n} files missing")] if missing else ()),
+        *([counted_message(other, "{n} other question", "{n} other questions")] if other and missing else ()),
+        *(
+            [counted_message(other, "{n} open question", "{n} open questions")]
+            if other and not missing
+            else ()
+        ),
+    ]
+    return joined(", ", parts)

@@ -15,17 +15,19 @@ server's rule too, so a faulty client cannot break it.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import partial
 from typing import Any, Protocol
 
-from silo.api.wire import Component, MergeEntry, MergeRequest, MergeResult, SourceDocument
+from silo.api.wire import Component, HeldReport, MergeEntry, MergeRequest, MergeResult, SourceDocument
 from silo.bom.compare.merge import MergePlan
 from silo.bom.entry import BomEntry
 from silo.bom.errors import SiloError
 from silo.bom.items.lookup import ItemLookup
 from silo.bom.left_out import components_of
+from silo.bom_sync.held import report_held
 from silo.bom_sync.memory import server_of
 from silo.bom_sync.reported_lines import is_reported, remember_reported
 from silo.bom_sync.resolved import Resolved, assemblies, blocking, left_out_parts, names_of
@@ -37,6 +39,8 @@ class SyncApi(ItemLookup, Protocol):
     def get_bom(self, part_number: str, /) -> Sequence[Any]: ...
 
     def merge_bom(self, part_number: str, request: MergeRequest, /) -> MergeResult: ...
+
+    def hold_bom(self, part_number: str, report: HeldReport, /) -> Any: ...
 
 
 class Status(StrEnum):
@@ -135,6 +139,10 @@ def sync(
         outcome = decide(resolved, lines, allow_missing=allow_missing, server=server)
         if dry_run and outcome.status in (Status.MERGED, Status.UNCHANGED):
             return replace(outcome, status=Status.DRY_RUN)
+        if outcome.status is Status.BLOCKED and not dry_run:
+            # A server that cannot take the report hears of it with the next sync; this one says it here.
+            with suppress(SiloError):
+                report_held(resolved, api, describe())
         if outcome.status is not Status.MERGED or number is None:
             return outcome
         request = merge_request(resolved, sync_id, describe())

@@ -47,12 +47,14 @@ from silo.bom.errors import (
 )
 from silo.bom.snapshot import from_plain
 from silo.bom.view.folders import project_folder
+from silo.bom_sync.held import report_held, why_held
 from silo.bom_sync.memory import server_of
 from silo.bom_sync.reported_lines import remember_reported
 from silo.bom_sync.resolved import Resolved, resolve
 from silo.bom_sync.steps import Status, decide, merge_request, server_lines
 from silo.file_state import is_seen, is_set_back, stands
 from silo.outbox.entry import ASKED, SAME_PART, Entry, InFile, State, new_key
+from silo.outbox.held_here import HeldHere
 from silo.outbox.recorded import former_document, note_arrived
 from silo.outbox.report import Report, Sent
 from silo.outbox.store import OutboxError, Store
@@ -513,6 +515,7 @@ class _SendRun:
             where = server_of(self.client)
             decided = decide(resolved, lines, allow_missing=entry.allow_missing, server=where)
             sent = replace(sent, plan=decided.plan, status=decided.status, sync_id=entry.key)
+            self._note_held(sent)
             if decided.status is not Status.MERGED:
                 self.store.arrived(entry, "bom", note=decided.status is Status.UNCHANGED)
                 return sent
@@ -529,6 +532,7 @@ class _SendRun:
         except NewerRevisionError as error:
             # The colleague's file was made from this one, so their BOM has this one's changes.
             self.store.arrived(entry, "bom", note=False)
+            self.store.free_bom(self.client.base_url, entry.identity)
             remark = "Its BOM was not sent: {} has committed revision {} since, whose BOM counts".format(
                 error.revision.get("created_by") or "somebody", error.revision.get("revision_number", "?")
             )
@@ -539,9 +543,34 @@ class _SendRun:
             self._again(entry)
             raise _PassingError(str(error)) from error
         self.store.arrived(entry, "bom")
+        if sent.resolved is not None and sent.resolved.assembly.silo_uuid:
+            self.store.free_bom(self.client.base_url, sent.resolved.assembly.silo_uuid)
         if sent.resolved is not None and sent.plan is not None:
             remember_reported(sent.resolved, sent.plan, server_of(self.client))
         return replace(sent, status=Status.MERGED, result=result, sync_id=wanted.sync_id or "")
+
+    def _note_held(self, sent: Sent) -> None:
+        """Remember here whether a BOM is held, and let the server know that it is.
+
+        Raises SiloError if the server cannot take the report now: the commit waits until it can.
+        """
+        entry, resolved = sent.entry, sent.resolved
+        if resolved is None or not (identity := resolved.assembly.silo_uuid):
+            return
+        server = canonical(self.client.base_url)
+        if sent.status is not Status.BLOCKED:
+            if sent.status is Status.UNCHANGED:
+                self.store.free_bom(server, identity)
+            return
+        label = entry.label or Path(entry.path).name
+        why, since = why_held(resolved), self.store.clock()
+        self.store.hold_bom(HeldHere(server, identity, sent.number, entry.path, label, why, since))
+        document = SourceDocument(file=Path(entry.path).name, folder=project_folder(entry.path))
+        try:
+            report_held(resolved, self.client, document if entry.path else None)
+        except SiloError as error:
+            if _waits(error) or isinstance(error, CancelledError):
+                raise
 
     def _at_revision(self, entry: Entry) -> Entry:
         """Give an entry without a file the revision that its document is, or was made from."""

@@ -34,10 +34,12 @@ from typing import Any, BinaryIO
 from silo.api.address import canonical
 from silo.api.pause import Pause
 from silo.bom.errors import ConflictError, DocumentError, InputError, counted
+from silo.bom.message import Message
 from silo.bom.snapshot import to_plain
 from silo.checksums import content_hash
 from silo.folder_lock import folder_lock
 from silo.outbox.entry import ASKED, SAME_PART, UNKNOWN, Commit, CommitFields, Entry, State, on_top
+from silo.outbox.held_here import HeldHere, held_row
 from silo.outbox.tables import SELECT, TABLES, VERSION, entry_of
 from silo.platform import (
     data_folder,
@@ -65,7 +67,7 @@ _OTHER_FILE = "another file"
 KEPT_ASIDE_DAYS = 90
 _NEWEST_DAYS = 3
 
-_TABLE_NAMES = ("entry", "sent", "pause", "derived", "known")
+_TABLE_NAMES = ("entry", "sent", "pause", "derived", "known", "held_bom")
 # Another process may be making the database; it takes no longer.
 _PATIENCE_S = 20.0
 
@@ -664,6 +666,37 @@ class Store(FileOrigins):
         """End all pauses of a server; ``told``: also those that the server asked for."""
         with self.transaction() as db:
             db.execute("DELETE FROM pause WHERE server = ? AND told <= ?", (canonical(server), told))
+
+    # -- BOMs that are held -----------------------------------------------------------------------------
+
+    def held_boms(self, server: str = "") -> tuple[HeldHere, ...]:
+        """Return the BOMs that a server lacks since they cannot be sent, oldest first; "": of any server."""
+        here = canonical(server) if server else ""
+        with self._open() as db:
+            rows = db.execute("SELECT * FROM held_bom WHERE ? IN (server, '') ORDER BY since", (here,))
+            return tuple(map(held_row, rows))
+
+    def hold_bom(self, held: HeldHere) -> None:
+        """Remember that a BOM is held; it keeps the time from which it was."""
+        why = held.why.as_json() if isinstance(held.why, Message) else held.why
+        row = vars(held) | {"server": canonical(held.server), "why": json.dumps(why)}
+        with self.transaction() as db:
+            db.execute(
+                f"INSERT INTO held_bom ({', '.join(row)}) VALUES (:{', :'.join(row)})"  # noqa: S608
+                " ON CONFLICT (server, identity) DO UPDATE SET part_number = excluded.part_number,"
+                " path = excluded.path, label = excluded.label, why = excluded.why",
+                row,
+            )
+
+    def free_bom(self, server: str, identity: str) -> bool:
+        """Forget that a BOM is held; returns True if it was."""
+        where = (canonical(server), identity)
+        with self._open() as db:
+            if not db.execute("SELECT 1 FROM held_bom WHERE server = ? AND identity = ?", where).fetchone():
+                return False
+        with self.transaction() as db:
+            db.execute("DELETE FROM held_bom WHERE server = ? AND identity = ?", where)
+        return True
 
     # -- reading and changing ---------------------------------------------------------------------------
 

@@ -9,7 +9,7 @@ from dataclasses import fields
 
 from silo.outbox.entry import Entry, State
 
-VERSION = 8
+VERSION = 9
 
 TABLES = """
 CREATE TABLE entry (
@@ -66,6 +66,16 @@ CREATE TABLE derived (
     sha256 TEXT PRIMARY KEY,               -- a file that FreeCAD saved
     origin TEXT NOT NULL,                  -- what FreeCAD had read or written before
     at REAL NOT NULL
+);
+CREATE TABLE held_bom (
+    server TEXT NOT NULL,
+    identity TEXT NOT NULL COLLATE NOCASE, -- of the assembly
+    part_number TEXT NOT NULL,
+    path TEXT NOT NULL,
+    label TEXT NOT NULL,
+    why TEXT NOT NULL,                     -- JSON of a message
+    since REAL NOT NULL,
+    PRIMARY KEY (server, identity)
 );
 CREATE TABLE known (
     server TEXT NOT NULL,

@@ -847,6 +847,20 @@ def _credentials(op: Operations) -> None:
             table.create_unique_constraint(f"uq_{name}_credential_id", ["credential_id"])
 
 
+def _held_boms(op: Operations) -> None:
+    """Let a client report the BOMs that wait on its computer."""
+    op.create_table(
+        "held_boms",
+        primary("parent_id", Id, ForeignKey("items.id"), autoincrement=False),
+        needed("since", Stamp),
+        needed("at", Stamp),
+        needed("username", String(64)),
+        needed("left_out", Text),
+        Column("document_file", Text),
+        Column("folder", Text),
+    )
+
+
 STEPS: dict[str, Callable[[Operations], None]] = {
     "0007": _first_schema,
     "0008": _answers,
@@ -863,4 +877,5 @@ STEPS: dict[str, Callable[[Operations], None]] = {
     "0020": _units,
     "0021": _attachments,
     "0022": _credentials,
+    "0023": _held_boms,
 }

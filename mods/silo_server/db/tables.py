@@ -294,6 +294,19 @@ bom_last_syncs = Table(
     Index("ix_bom_last_syncs_open", "parent_id", **only(INCOMPLETE)),
 )
 
+# A BOM that waits on a designer's computer: what for, since when, and when it was last reported.
+held_boms = Table(
+    "held_boms",
+    metadata,
+    primary("parent_id", Id, ForeignKey("items.id"), autoincrement=False),
+    needed("since", Stamp),
+    needed("at", Stamp),
+    needed("username", String(64)),
+    needed("left_out", Text),
+    Column("document_file", Text),
+    Column("folder", Text),
+)
+
 # What services.product keeps of each assembly: no foreign key, so that keeping waits for no item.
 product_summaries = Table(
     "product_summaries",

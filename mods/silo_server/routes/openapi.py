@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from silo.api.wire import RELEASE_LABEL, MergeRequest
+from silo.api.wire import RELEASE_LABEL, HeldReport, MergeRequest
 from silo.bom.quantities import LARGEST_QUANTITY
 from silo.bom.text import REFUSED_CHARACTERS
 from silo_server.schema import ITEM_TYPES, find_schema
@@ -153,6 +153,9 @@ _MERGE: dict[str, dict[str, Schema]] = {
         "source": {"description": "not read: the entries are an assembly's"},
     },
     "Component": {"file": text(4096), "object": text(1024)},
+    "HeldReport": {
+        "left_out": {"type": "array", "minItems": 1, "items": {"$ref": "#/components/schemas/LeftOutPart"}}
+    },
     "SourceDocument": {
         "file": text(4096),
         "sha256": or_null(SHA256),
@@ -181,9 +184,12 @@ def complete(document: Schema) -> Schema:
     schemas = document["components"]["schemas"]
     for name in ("HTTPValidationError", "ValidationError"):
         schemas.pop(name, None)
-    # The merge reads its body by itself (services.bom.merge_request); its form is the wire model's.
+    # The merge, and the report of a held BOM, read their bodies by themselves (services.bom.merge_request);
+    # the form is the wire model's.
     merge = MergeRequest.model_json_schema(ref_template="#/components/schemas/{model}")
     schemas.update(merge.pop("$defs"), MergeRequest=merge, JsonValue=_JSON_VALUE)
+    held = HeldReport.model_json_schema(ref_template="#/components/schemas/{model}")
+    schemas["HeldReport"] = {key: value for key, value in held.items() if key != "$defs"}
     for model, fields in _MERGE.items():
         schemas[model]["properties"].update(fields)
     _refer(document)

@@ -469,7 +469,8 @@ def print_page(call: Reader, part_number: str, look: Asked) -> Response:
 def structure_of(tx: Tx, item: Item, look: Look, size: int = PAGE_ROWS) -> dict[str, Any]:
     """Collect what a BOM over all levels shows: table, totals, and what the last sync left out."""
     last = last_sync(tx, item)
-    values: dict[str, Any] = {"last": last, "gaps": in_sentences(last.gaps), "problem": ""}
+    values: dict[str, Any] = {"last": last, "gaps": in_sentences(last.own_gaps), "problem": ""}
+    values |= {"held_gaps": in_sentences(last.held_gaps)}
     values |= dict.fromkeys(("table", "totals", "of_all")) | dict.fromkeys(("levels", "depth"), 0)
     values |= {"above": ()} | dict.fromkeys(("has_mass", "has_cost", "has_supplier"), False)
     try:

@@ -43,6 +43,7 @@ KINDS: Mapping[str, tuple[str, Callable[[Waiting], int]]] = {
     "incomplete": (N_("incomplete syncs"), lambda row: row.left_out),
     "unregistered": (N_("unregistered parts"), lambda row: row.unregistered),
     "units": (N_("lines with unit?"), lambda row: row.units),
+    "held": (N_("BOMs that are held"), lambda row: int(row.held is not None)),
 }
 _SORTS: Mapping[str, Callable[[Waiting], Any]] = {
     "number": lambda row: row.part_number.casefold(),
@@ -279,7 +280,7 @@ def _show(
 
 def _open_of(*rows: Waiting) -> list[str]:
     """Count what is open in these BOMs, by kind, in words."""
-    unreferenced, conflicts, left_out, unregistered, units = (
+    unreferenced, conflicts, left_out, unregistered, units, held = (
         sum(count(row) for row in rows) for _words, count in KINDS.values()
     )
     counts = {
@@ -288,6 +289,7 @@ def _open_of(*rows: Waiting) -> list[str]:
         plural(left_out, "component left out", "components left out"): left_out,
         plural(unregistered, "unregistered part"): unregistered,
         plural(units, "line with unit?", "lines with unit?"): units,
+        plural(held, "BOM held at a designer's", "BOMs held at a designer's"): held,
     }
     return [words for words, count in counts.items() if count]
 

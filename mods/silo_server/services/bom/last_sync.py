@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from sqlalchemy import delete, insert, select, update
@@ -19,6 +19,7 @@ from silo_server.db.rows import one_of
 from silo_server.db.tables import bom_last_syncs
 from silo_server.db.transaction import Tx
 from silo_server.fields import from_row
+from silo_server.services.bom.held import HeldBom, forget_held, held_of
 from silo_server.services.bom.merge_request import MergeRequestIn
 from silo_server.times import wire_time
 from silo_server.user_json import dumps
@@ -33,6 +34,8 @@ class LastSync:
         what the assembly holds and the BOM does not: the fields of :class:`silo.bom.left_out.LeftOut`.
     refused_at
         when the server refused a later merge, None if it did not; ``refusal`` says why.
+    held
+        a later BOM waits on the designer's computer (:mod:`silo_server.services.bom.held`).
     """
 
     at: str | None = None
@@ -43,23 +46,44 @@ class LastSync:
     refusal: str = ""
     components: Mapping[int, Sequence[Mapping[str, str]]] = field(default_factory=dict)
     folder: str = ""
+    held: HeldBom | None = None
 
     @property
     def gaps(self) -> list[dict[str, Any]]:
-        """List everything that is not in the BOM, including a refused merge."""
+        """List everything that is not in the BOM, including a merge that was refused or is held."""
+        gaps = self.own_gaps
+        if self.held is not None:
+            gaps.append(self.held.as_gap())
+        return gaps
+
+    @property
+    def own_gaps(self) -> list[dict[str, Any]]:
+        """List what the last merge left out, and that it was refused."""
         gaps = [dict(part) for part in self.left_out]
         if self.refused_at:
             gaps.append({"reason": Reason.REFUSED.value, "message": self.refusal})
         return gaps
 
     @property
+    def held_gaps(self) -> Sequence[Mapping[str, Any]]:
+        """List what holds a later BOM back."""
+        return () if self.held is None else self.held.left_out
+
+    @property
     def words(self) -> str:
         """Count the gaps in words: ``2 missing, 1 unregistered``; "" if there are none."""
-        return in_words(self.gaps)
+        return in_words(self.own_gaps)
+
+    @property
+    def incomplete(self) -> str:
+        """Say that the BOM lacks something, and what; "" if it does not."""
+        words = [f"incomplete: {self.words}"] if self.words else []
+        return ", ".join([*words, *([str(self.held.words)] if self.held is not None else [])])
 
     def to_wire(self) -> dict[str, Any]:
         """Return the last sync as the API sends it."""
-        return {"at": wire_time(self.at), "left_out": self.gaps}
+        held = {} if self.held is None else {"held": self.held.to_wire()}
+        return {"at": wire_time(self.at), "left_out": self.gaps, **held}
 
 
 NEVER = LastSync()
@@ -73,7 +97,10 @@ def last_sync(tx: Tx, parent: Item) -> LastSync:
 def last_syncs(tx: Tx, parent_ids: Collection[int]) -> dict[int, LastSync]:
     """Read the last syncs of these assemblies; those that were never synced (nor refused) are absent."""
     rows = tx.conn.execute(select(bom_last_syncs).where(one_of(tx, bom_last_syncs.c.parent_id, parent_ids)))
-    return {row.parent_id: _read(row) for row in rows}
+    syncs = {row.parent_id: _read(row) for row in rows}
+    for parent_id, held in held_of(tx, parent_ids).items():
+        syncs[parent_id] = replace(syncs.get(parent_id, NEVER), held=held)
+    return syncs
 
 
 def _read(row: Any) -> LastSync:
@@ -81,6 +108,7 @@ def _read(row: Any) -> LastSync:
         LastSync,
         row,
         left_out=json.loads(row.left_out),
+        held=None,
         refusal=row.refusal or "",
         components={int(child): components for child, components in json.loads(row.components).items()},
         folder=row.folder or "",
@@ -103,6 +131,7 @@ def record_merge(
     components_before = {str(child): list(parts) for child, parts in before.components.items()}
     components = remembered(components_before, entries, [str(children[number]) for number in kept])
     tx.conn.execute(delete(bom_last_syncs).where(bom_last_syncs.c.parent_id == parent.id))
+    forget_held(tx, parent)
     row = {
         "at": tx.stamp,
         "document_file": request.document_file,
@@ -142,6 +171,7 @@ def _sentence(gap: Mapping[str, Any]) -> str:
         Reason.MISSING: f"{who}{where}: the file is missing or cannot be read",
         Reason.UNREGISTERED: f"{who}{where}: no part number yet",
         Reason.BROKEN: str(gap.get("message", "")),
+        Reason.HELD: f"a later BOM is {gap.get('message', '')}",
         Reason.REFUSED: f"a later sync was refused: {gap.get('message', '')}",
     }
     return texts.get(gap["reason"], f"{gap['reason']}: {who}{where} {gap.get('message', '')}").rstrip()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""A merge request, read from its decoded JSON body (spec bom-sync §5).
+"""A merge request (spec bom-sync §5), and the report of a BOM that is held, read from decoded JSON.
 
 It is read by hand and not by a model, because a bad quantity and an unknown part number are reported
 together, each with the index of its entry, in the one 400.
@@ -86,6 +86,14 @@ def read_merge_request(body: Any, max_entries: int) -> MergeRequestIn:
         problems = _sums_too_large(entries)
     left_out = _left_out(body.get("left_out"), max_entries)
     return MergeRequestIn(entries, problems, sync_id, bool(dry_run), *document, left_out)
+
+
+def read_held_report(body: Any, max_entries: int) -> tuple[list[dict[str, Any]], str | None, str | None]:
+    """Read what a client says of a BOM that it cannot send: what holds it, its file, its project's folder."""
+    if not isinstance(body, Mapping) or not isinstance(body.get("left_out"), list) or not body["left_out"]:
+        raise RejectedError('body: wanted {"left_out": [{"reason": …, "name": …}, …]}, at least one of them')
+    file, folder, _sha256, _revision = _document(body.get("document"))
+    return _left_out(body["left_out"], max_entries), file, folder
 
 
 def _sums_too_large(entries: Sequence[MergeRequestEntry]) -> list[tuple[int, str]]:

@@ -25,11 +25,13 @@ from silo_server.db.tables import (
     assignees,
     bom_last_syncs,
     bom_lines,
+    held_boms,
     items,
     users,
 )
 from silo_server.db.transaction import Tx
 from silo_server.services.bom.conflicts import CadQuantities, conflicts_in
+from silo_server.services.bom.held import HeldBom, all_held
 
 
 class Waiting(NamedTuple):
@@ -39,6 +41,8 @@ class Waiting(NamedTuple):
         CAD's quantities in its conflicts, by the child's internal id.
     units
         how many lines have a unit of another kind than their part's.
+    held
+        the BOM that waits on a designer's computer; None if none does.
     """
 
     item_id: int
@@ -54,6 +58,7 @@ class Waiting(NamedTuple):
     left_out: int
     unregistered: int
     units: int
+    held: HeldBom | None
 
     @property
     def conflicts(self) -> int:
@@ -72,7 +77,7 @@ def waiting(tx: Tx) -> list[Waiting]:
     Reads only what a list of them is filtered and sorted by: there may be thousands.
     """
     unreferenced, conflicts, gaps = _unreferenced(tx), conflicts_in(tx), _gaps(tx)
-    units = _units(tx)
+    units, held = _units(tx), all_held(tx)
     row, last, none = items.c, bom_last_syncs.c, CadQuantities()
     shown = (row.id, row.part_number, row.name, row.bom_version, last.folder, last.document_file, last.at)
     query = (
@@ -80,22 +85,32 @@ def waiting(tx: Tx) -> list[Waiting]:
         .outerjoin_from(items, bom_last_syncs, last.parent_id == row.id)
         .outerjoin(assignees, assignees.c.item_id == row.id)
         .outerjoin(users, users.c.id == assignees.c.user_id)
-        .where(one_of(tx, row.id, {*unreferenced, *conflicts, *gaps, *units}), row.archived_at.is_(None))
+        .where(
+            one_of(tx, row.id, {*unreferenced, *conflicts, *gaps, *units, *held}), row.archived_at.is_(None)
+        )
     )
     waitings = [
         Waiting(
-            *(record, number, name, version, folder or "", file or "", at),
+            *(record, number, name, version, *_place(folder, file, held.get(record)), at),
             *(
                 conflicts.get(record, none),
                 who or "",
                 unreferenced[record],
                 *gaps.get(record, (0, 0)),
                 units[record],
+                held.get(record),
             ),
         )
         for record, number, name, version, folder, file, at, who in tx.conn.execute(query)
     ]
     return sorted(waitings, key=lambda record: record.part_number.casefold())
+
+
+def _place(folder: str | None, file: str | None, held: HeldBom | None) -> tuple[str, str]:
+    """Return project folder and file of a BOM; a BOM that was never merged may be held."""
+    if held is not None:
+        folder, file = folder or held.folder, file or held.document_file
+    return folder or "", file or ""
 
 
 def waiting_count(tx: Tx) -> int:
@@ -111,8 +126,13 @@ def open_among(tx: Tx, item_ids: Collection[int]) -> int:
 def waiting_in(tx: Tx, folder: str) -> int:
     """Count the BOMs that wait in a project folder and in the folders below it."""
     last = bom_last_syncs.c
-    inside = or_(last.folder == folder, last.folder.startswith(f"{folder}/", autoescape=True))
-    return _count(tx, lambda element: element.in_(select(last.parent_id).where(inside)))
+    inside = [
+        select(row.parent_id).where(
+            or_(row.folder == folder, row.folder.startswith(f"{folder}/", autoescape=True))
+        )
+        for row in (last, held_boms.c)
+    ]
+    return _count(tx, lambda element: or_(*(element.in_(some) for some in inside)))
 
 
 def _count(tx: Tx, which: Callable[[ColumnElement[int]], ColumnElement[bool]]) -> int:
@@ -120,7 +140,8 @@ def _count(tx: Tx, which: Callable[[ColumnElement[int]], ColumnElement[bool]]) -
     incomplete = select(bom_last_syncs.c.parent_id).where(text(f"({INCOMPLETE})"))
     disputed = select(items.c.id).where(one_of(tx, items.c.id, conflicts_in(tx)))
     in_units = select(items.c.id).where(one_of(tx, items.c.id, _units(tx)))
-    parent_id = union(unreferenced, incomplete, disputed, in_units).subquery().c.parent_id
+    held = select(held_boms.c.parent_id)
+    parent_id = union(unreferenced, incomplete, disputed, in_units, held).subquery().c.parent_id
     # Archived items are few: PostgreSQL reads all items, for each page, if asked which of these are not.
     archived = select(items.c.id).where(items.c.archived_at.is_not(None))
     return (

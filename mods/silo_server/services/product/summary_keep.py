@@ -23,7 +23,7 @@ from sqlalchemy import delete, select
 from silo.bom.errors import CycleError
 from silo_server.db.database import Database
 from silo_server.db.rows import insert_rows, one_of
-from silo_server.db.tables import bom_last_syncs, bom_lines, items, product_summaries
+from silo_server.db.tables import bom_last_syncs, bom_lines, held_boms, items, product_summaries
 from silo_server.db.tables import events as event_log
 from silo_server.db.transaction import EVENT_LOCK, Tx
 from silo_server.db.usage import uses_of
@@ -60,10 +60,13 @@ def _keep(tx: Tx, built: Built) -> None:
     if built.head < log.horizon_of(tx):
         return
     since = select(event_log.c.item_uuid).where(event_log.c.id > built.head)
-    # A refused sync has no event, and a time that may be before the look by as long as a change may take.
+    # A sync that is refused or held has no event, and a time that may be before the look by as long as a
+    # change may take.
     begun = stamp(datetime.fromisoformat(built.at) - timedelta(seconds=LONGEST_CHANGE))
     refused = select(bom_last_syncs.c.parent_id).where(bom_last_syncs.c.refused_at > begun)
-    touched = set(tx.conn.scalars(uses_of(items.c.uuid.in_(since) | items.c.id.in_(refused))))
+    held = select(held_boms.c.parent_id).where(held_boms.c.at > begun)
+    told = items.c.id.in_(refused) | items.c.id.in_(held)
+    touched = set(tx.conn.scalars(uses_of(items.c.uuid.in_(since) | told)))
     rows = [row for row in built.rows if row["item_id"] not in touched]
     if rows:
         ids = [row["item_id"] for row in rows]

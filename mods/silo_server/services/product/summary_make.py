@@ -179,7 +179,7 @@ def _open(tx: Tx, lines: Mapping[int, Sequence[Line]], own: Mapping[int, _Own]) 
     boms: dict[int, OpenBom] = {}
     for item_id in ids:
         last, below = syncs.get(item_id, NEVER), lines.get(item_id, ())
-        incomplete = f"incomplete: {last.words}" if last.gaps else ""
+        incomplete = last.incomplete
         if not incomplete and last.at is None and not below:
             incomplete = "never synced"
         gone = sum(line.state.unreferenced_since is not None for line in below)
