@@ -127,13 +127,15 @@ def test_an_order_list_over_all_levels(api: Api, product: tuple[str, ...]) -> No
             "needed": "1040",
             "quantity": "1100",
             "price": "0.1",
-            "cost": "110",
+            "cost": "103.95",
+            "order_cost": "110",
             "remarks": [],
         }
         == rows[screw]
     )
     assert (rows[plate]["kind"], rows[plate]["needed"], rows[plate]["files"]) == ("made", "189", [])
-    assert (told["total_cost"], told["currency"], told["lead_time_days"]) == ("110", "EUR", 5)
+    assert (told["total_cost"], told["currency"], told["lead_time_days"]) == ("103.95", "EUR", 5)
+    assert (told["order_costs"], told["unpriced"]) == ({"EUR": "110"}, 1)
     assert told["warnings"][0] == "This is the draft, not a released revision"
     # A price counts from its very quantity on, and who is preferred sells even if another is cheaper.
     cheap = {**MISUMI, "supplier": "Cheap", "prices": [{"price": "0"}]}
@@ -162,11 +164,13 @@ def test_nothing_is_left_out(api: Api, product: tuple[str, ...]) -> None:
         third: ("bought", ["no rate for USD"]),
         fourth: ("unsaid", []),
     }
-    assert (told["unpriced"], told["total_cost"], told["costs"]) == (3, "0", {"USD": "12"})
+    costs = told["unpriced"], told["without_rate"], told["total_cost"], told["costs"]
+    assert costs == (4, 1, "0", {"USD": "0.12"})
+    assert told["order_costs"] == {"USD": "12"}
     api.good("PUT", "/api/rates", {"currency": "EUR", "rates": {"USD": "0.5"}})
     assert api.get("/api/rates") == {"currency": "EUR", "rates": {"USD": "0.5"}}
     again = api.get(order(top))
-    assert (again["unpriced"], again["total_cost"]) == (2, "6")
+    assert (again["unpriced"], again["without_rate"], again["total_cost"]) == (4, 0, "0.06")
 
 
 def test_a_bought_assembly_is_a_part(api: Api, product: tuple[str, ...]) -> None:
@@ -285,10 +289,11 @@ def test_a_table_for_each_supplier(api: Api, product: tuple[str, ...]) -> None:
     head = next(i for i, line in enumerate(lines) if line[0] == "Supplier")
     assert lines[0][0].startswith(f"For 10 of {top}")
     (row,) = (dict(zip(lines[head], line, strict=True)) for line in lines[head + 1 :])
-    assert (row["Supplier"], row["Part number"], row["Quantity"], row["Cost"]) == (
+    assert (row["Supplier"], row["Part number"], row["Quantity"], row["Cost"], row["Order cost"]) == (
         "'=Bolt",
         screw,
         "100",
+        "3.6",
         "12",
     )
     book = load_workbook(io.BytesIO(api.call("GET", order(top, ".xlsx")).body)).active

@@ -162,7 +162,9 @@ class OrderPart(Answer):
 
     total, needed, ordered
         what all pieces hold of it, with spares, and what was ordered already.
-    quantity, price, cost
+    price, cost
+        of one, and of what is needed, in ``currency``; None if not known. ``cost_from``: where that is from.
+    quantity, order_cost
         of what is bought, in whole packs, in the currency of the ``supplier_part``.
     """
 
@@ -173,9 +175,12 @@ class OrderPart(Answer):
     total: str
     needed: str
     ordered: str = "0"
-    quantity: str | None = None
     price: str | None = None
     cost: str | None = None
+    currency: str | None = None
+    cost_from: str = ""
+    quantity: str | None = None
+    order_cost: str | None = None
     remarks: list[str] = Field(default_factory=list)
     files: list[PartFile] = Field(default_factory=list)
     supplier_part: SupplierPart | None = None
@@ -185,7 +190,10 @@ class OrderList(Answer):
     """What to order for so many pieces of a product (``GET …/order``). Amounts are as in a SupplierPart.
 
     costs
-        per currency; ``total_cost`` is in the site's ``currency``, without the ``unpriced`` parts.
+        of all parts, per currency, without the ``unpriced`` ones; ``total_cost`` is in the site's
+        ``currency``, without the parts of a currency ``without_rate``.
+    order_costs
+        what is paid for what is bought, in whole packs, per currency.
     """
 
     part_number: str
@@ -197,7 +205,9 @@ class OrderList(Answer):
     costs: dict[str, str] = Field(default_factory=dict)
     total_cost: str = "0"
     currency: str = "EUR"
+    order_costs: dict[str, str] = Field(default_factory=dict)
     unpriced: int = 0
+    without_rate: int = 0
     lead_time_days: int | None = None
     without_lead_time: int = 0
     parts: list[OrderPart] = Field(default_factory=list)

@@ -861,6 +861,11 @@ def _held_boms(op: Operations) -> None:
     )
 
 
+def _graded_costs(op: Operations) -> None:
+    """Forget the summaries: costs are made of the suppliers' prices too. They are made again when asked."""
+    op.execute("DELETE FROM product_summaries")
+
+
 STEPS: dict[str, Callable[[Operations], None]] = {
     "0007": _first_schema,
     "0008": _answers,
@@ -878,4 +883,5 @@ STEPS: dict[str, Callable[[Operations], None]] = {
     "0021": _attachments,
     "0022": _credentials,
     "0023": _held_boms,
+    "0024": _graded_costs,
 }

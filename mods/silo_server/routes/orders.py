@@ -226,7 +226,9 @@ def get_order(call: Viewer, part_number: str, asked: AskedFor) -> dict[str, Any]
         "costs": {currency: decimal_text(cost) for currency, cost in order_list.costs.items()},
         "total_cost": decimal_text(order_list.total),
         "currency": order_list.currency,
+        "order_costs": {code: decimal_text(cost) for code, cost in order_list.order_costs.items()},
         "unpriced": order_list.unpriced,
+        "without_rate": order_list.without_rate,
         "lead_time_days": order_list.lead_time,
         "without_lead_time": order_list.no_lead_time,
         "parts": [_row_to_wire(row) for row in order_list.rows],
@@ -234,8 +236,8 @@ def get_order(call: Viewer, part_number: str, asked: AskedFor) -> dict[str, Any]
 
 
 def _row_to_wire(row: OrderRow) -> dict[str, Any]:
-    offer = row.offer
-    row_json = {
+    offer, of = row.offer, row.cost
+    return {
         "part_number": row.item.part_number,
         "name": row.item.name,
         "kind": row.kind,
@@ -243,15 +245,16 @@ def _row_to_wire(row: OrderRow) -> dict[str, Any]:
         "total": decimal_text(row.total),
         "needed": decimal_text(row.needed),
         "ordered": decimal_text(row.ordered),
+        "price": None if of.price is None else decimal_text(of.price),
+        "cost": None if of.cost is None else decimal_text(of.cost),
+        "currency": of.currency,
+        "cost_from": of.words,
+        "quantity": None if offer is None else decimal_text(offer.amount),
+        "order_cost": None if offer is None or offer.cost is None else decimal_text(offer.cost),
         "remarks": row.remarks,
         "files": [amount._asdict() for amount in row.files],
         "supplier_part": suppliers.to_json(offer.of) if offer else None,
     }
-    if offer is not None:
-        money = {"price": offer.price, "cost": offer.cost}
-        row_json["quantity"] = decimal_text(offer.amount)
-        row_json |= {name: None if amount is None else decimal_text(amount) for name, amount in money.items()}
-    return row_json
 
 
 @router.get("/items/{part_number}/order.csv", response_class=Response, responses=content_of("text/csv"))

@@ -3,8 +3,10 @@
 
 The parts are those of the one flat list (:func:`silo_server.services.product.flat.flatten`), where a bought
 assembly counts as a part. What is open comes from the kept summary, or from the release. Bought parts
-have a supplier and a price (:mod:`silo_server.services.suppliers`), made parts a material, a mass and
-their files. Nothing is left out: what was called neither made nor bought is listed as such.
+have an offer in whole packs (:mod:`silo_server.services.suppliers`), made parts a material, a mass and
+their files. Each part has its cost (:mod:`silo_server.services.product.cost`), so that the list costs what
+the product costs; what is paid for whole packs stands beside it. Nothing is left out: what is called
+neither made nor bought is listed as such.
 """
 
 from __future__ import annotations
@@ -27,22 +29,17 @@ from silo_server.db.transaction import Tx
 from silo_server.fields import from_row
 from silo_server.services import audit
 from silo_server.services.items import get_item
+from silo_server.services.product.amounts import UNIT_OPEN
+from silo_server.services.product.cost import PartCost, added_up, bought_whole, in_base, part_cost
 from silo_server.services.product.export import Export, Row, View
 from silo_server.services.product.flat import FlatRow, flatten
 from silo_server.services.product.frozen import frozen_product
 from silo_server.services.product.graph import Graph, load_graph
-from silo_server.services.product.parts import RolledItem, parts_of
+from silo_server.services.product.parts import RolledItem, parts_of, positive_number
 from silo_server.services.product.summary import Summary
-from silo_server.services.product.summary_make import own_worth
 from silo_server.services.product.summary_read import summary_of
 from silo_server.services.releases import Release, get_release, newest_release
-from silo_server.services.suppliers import (
-    SupplierOffer,
-    choose,
-    decimal_text,
-    rates_of,
-    supplier_parts_of,
-)
+from silo_server.services.suppliers import SupplierOffer, decimal_text, rates_of
 from silo_server.times import wire_time
 from silo_server.values import Item
 
@@ -106,6 +103,8 @@ class OrderRow(NamedTuple):
         what was ordered of it for this product.
     kind
         ``bought``, ``made`` or ``unsaid``.
+    cost
+        of what is needed, before it is rounded to whole pieces or packs.
     """
 
     item_id: int
@@ -116,8 +115,14 @@ class OrderRow(NamedTuple):
     ordered: Decimal
     doubts: Sequence[str]
     kind: str
-    offer: SupplierOffer | None = None
+    cost: PartCost
+    no_rate: bool = False
     files: Sequence[PartFile] = ()
+
+    @property
+    def offer(self) -> SupplierOffer | None:
+        """Return what its supplier sells, in whole packs; None if no supplier is known."""
+        return self.cost.offer
 
     @property
     def supplier(self) -> str:
@@ -125,9 +130,9 @@ class OrderRow(NamedTuple):
         return self.offer.of.supplier if self.offer else ""
 
     @property
-    def mass(self) -> Decimal | None:
+    def mass(self) -> float | None:
         """Read the mass of one piece [kg]; None if the part states none."""
-        return own_worth(self.item.properties).mass
+        return positive_number(self.item.properties, "mass_kg")
 
     @property
     def remarks(self) -> list[str]:
@@ -142,11 +147,11 @@ class OrderRow(NamedTuple):
             if self.offer.price is None:
                 least = of.prices[0][0] if of.prices else None
                 remarks.append("no price" if least is None else f"no price below {decimal_text(least)}")
-            elif self.offer.in_base is None:
-                remarks.append(f"no rate for {of.currency}")
             if self.offer.cheaper is not None:
                 more, cost = self.offer.cheaper
                 remarks.append(f"{decimal_text(more)} would cost less: {decimal_text(cost)} {of.currency}")
+        if self.no_rate and self.needed:
+            remarks.append(f"no rate for {self.cost.currency}")
         return remarks
 
 
@@ -155,9 +160,10 @@ class OrderList:
     """What to order for N pieces of a product. ``warnings`` stand on top.
 
     costs
-        of the bought parts with a price, per currency; ``total``: in the site's own, of those with a rate.
-    unpriced
-        bought parts that the cost does not hold: without supplier, price or rate.
+        of all parts, per currency, without the ``unpriced`` ones, whose cost is not known; ``total``: in the
+        site's own currency, without the parts of a currency ``without_rate``.
+    order_costs
+        what is paid for the bought parts with a supplier's price, in whole packs, per currency.
     lead_time
         the longest of the chosen supplier parts [days]; ``no_lead_time`` how many state none.
     """
@@ -170,7 +176,9 @@ class OrderList:
     costs: Mapping[str, Decimal]
     total: Decimal
     currency: str
+    order_costs: Mapping[str, Decimal]
     unpriced: int
+    without_rate: int
     lead_time: int | None
     no_lead_time: int
 
@@ -201,7 +209,7 @@ def order_list(tx: Tx, part_number: str, asked: OrderRequest) -> OrderList:
         graph, summary = load_graph(tx, product, bare=True), summary_of(tx, product)
         parts = parts_of(tx, graph)
         ids = {item_id: item_id for item_id in parts}
-    closed = {item_id for item_id, part in parts.items() if part.is_bought} - {graph.root.id}
+    closed = bought_whole(graph, parts)
     done, rates, none = _ordered(tx, product), rates_of(tx), dict[str | None, Decimal]()
     rows = [
         _row(
@@ -235,18 +243,18 @@ def _row(
     needed = exact_product((total, 1 + asked.spares / 100)) if asked.spares else total
     if asked.rest:
         needed = max(Decimal(0), exact_sum((needed, -done)))
+    cost = part_cost(part, needed, rates)
     if own.counts_pieces:
         needed = needed.to_integral_value(ROUND_CEILING)
-    offer = (
-        choose(supplier_parts_of(part), needed, rates, whole=own.counts_pieces) if kind == BOUGHT else None
-    )
+    no_rate = cost.currency is not None and cost.currency not in rates
     doubts = flat_row.doubts(asked.pieces)
     doubts += [
         f"ordered in another unit: {decimal_text(amount)} {unit}"
         for (unit, amount), same in zip(ordered.items(), amounts, strict=True)
         if same is None
     ]
-    return OrderRow(flat_row.line.child_id, part, flat_row.unit, total, needed, done, doubts, kind, offer)
+    item_id, unit = flat_row.line.child_id, flat_row.unit
+    return OrderRow(item_id, part, unit, total, needed, done, doubts, kind, cost, no_rate)
 
 
 def _state(
@@ -284,13 +292,15 @@ def _summed(
     state: str,
     warnings: Sequence[str],
 ) -> OrderList:
-    wanted = [row for row in rows if row.kind == BOUGHT and row.needed]
-    offers = [row.offer for row in wanted if row.offer]
-    costs: dict[str, list[Decimal]] = {}
+    wanted = [row for row in rows if row.needed]
+    bought = [row for row in wanted if row.kind == BOUGHT]
+    offers = [row.offer for row in bought if row.offer]
+    paid: dict[str, list[Decimal]] = {}
     for offer in offers:
         if offer.cost is not None:
-            costs.setdefault(offer.of.currency, []).append(offer.cost)
-    prices = [offer.in_base for offer in offers if offer.in_base is not None]
+            paid.setdefault(offer.of.currency, []).append(offer.cost)
+    costs = added_up(row.cost for row in wanted)
+    unpriced = [row for row in rows if UNIT_OPEN in row.doubts or (row.needed and row.cost.price is None)]
     stated = [offer.of.lead_time_days for offer in offers if offer.of.lead_time_days is not None]
     return OrderList(
         product,
@@ -298,12 +308,14 @@ def _summed(
         state,
         warnings,
         rows,
-        {currency: exact_sum(of_it) for currency, of_it in costs.items()},
-        exact_sum(prices),
+        costs,
+        in_base(costs, rates),
         next(iter(rates)),
-        len(wanted) - len(prices),
+        {currency: exact_sum(of_it) for currency, of_it in paid.items()},
+        len(unpriced),
+        sum(row.no_rate for row in wanted),
         max(stated, default=None),
-        len(wanted) - len(stated),
+        len(bought) - len(stated),
     )
 
 
@@ -451,12 +463,12 @@ def _ordered(tx: Tx, product: Item) -> dict[int | None, dict[str | None, Decimal
 
 _BOUGHT = (
     *("Supplier", "Supplier's part number", "Part number", "Name", "For the product", "Ordered already"),
-    *("Needed", "Quantity", "Unit", "Pack size", "Packs", "Price", "Cost", "Currency"),
-    *("Lead time [days]", "Link", "Remarks"),
+    *("Needed", "Quantity", "Unit", "Pack size", "Packs", "Price", "Cost", "Order cost", "Currency"),
+    *("Cost from", "Lead time [days]", "Link", "Remarks"),
 )
 _MADE = (
     *("Part number", "Name", "Material", "Unit mass [kg]", "For the product", "Ordered already", "Needed"),
-    *("Unit", "Files", "Remarks"),
+    *("Unit", "Price", "Cost", "Currency", "Cost from", "Files", "Remarks"),
 )
 
 
@@ -483,6 +495,10 @@ def _cells(row: OrderRow) -> Row:
         "Ordered already": plain(row.ordered) if row.ordered else None,
         "Needed": plain(row.needed),
         "Unit": row.unit,
+        "Price": plain(row.cost.price),
+        "Cost": plain(row.cost.cost),
+        "Currency": row.cost.currency,
+        "Cost from": row.cost.words,
         "Files": ", ".join(file.name for file in row.files) or "none",
         "Remarks": "; ".join(row.remarks) or None,
     }
@@ -494,9 +510,7 @@ def _cells(row: OrderRow) -> Row:
         "Quantity": plain(offer.amount),
         "Pack size": plain(offer.of.pack_size),
         "Packs": plain(offer.amount / offer.of.pack_size),
-        "Price": plain(offer.price),
-        "Cost": plain(offer.cost),
-        "Currency": offer.of.currency,
+        "Order cost": plain(offer.cost),
         "Lead time [days]": offer.of.lead_time_days,
         "Link": offer.of.link or None,
     }

@@ -173,14 +173,15 @@ def supplier_parts_of(item: Item | RolledItem) -> list[SupplierPart]:
     if not isinstance(supplier, str) or not supplier.strip():
         return []
     number = str(facts.get("supplier_part_number") or "")[:200].strip()
-    cost, currency = positive_number(facts, "standard_cost"), currency_of(facts).strip().upper()
+    cost, currency = positive_number(facts, "standard_cost"), currency_of(facts)
+    known = cost is not None and cost <= LARGEST_PRICE and _CODE.fullmatch(currency) is not None
     lead_time = facts.get("lead_time_days")
     days = None if lead_time is None else whole_number(str(lead_time).strip(), 4)
     part = SupplierPart(
         supplier.strip()[:200],
         "" if number and character_problem(number) else number,
-        prices=() if cost is None or cost > LARGEST_PRICE else ((Decimal(1), as_decimal(cost)),),
-        currency=currency if _CODE.fullmatch(currency) else DEFAULT_CURRENCY,
+        prices=((Decimal(1), as_decimal(cost)),) if known and cost is not None else (),
+        currency=currency if known else DEFAULT_CURRENCY,
         lead_time_days=None if days is None or days > LONGEST_LEAD_TIME else days,
     )
     return [part]

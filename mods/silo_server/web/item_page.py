@@ -24,7 +24,6 @@ from silo.bom.errors import BusyError, ConflictError, NotFoundError
 from silo.bom.quantities import as_decimal
 from silo_server.db.transaction import Tx
 from silo_server.errors import TooLargeError
-from silo_server.fields import names_of
 from silo_server.routes.items import told_of
 from silo_server.schema import ITEM_TYPES, find_schema
 from silo_server.services import documents, revisions
@@ -35,16 +34,36 @@ from silo_server.services.documents import documents_holding, get_document
 from silo_server.services.following import is_followed
 from silo_server.services.items import ItemQuery, get_item, list_items
 from silo_server.services.looks import last_look
-from silo_server.services.product.amounts import UNIT_OPEN, Exact, product, totals_of
+from silo_server.services.product.amounts import Exact, product, totals_of
+from silo_server.services.product.cost import (
+    PartCost,
+    ProductCost,
+    at_prices,
+    bought_whole,
+    own_worth,
+    part_cost,
+    prices_in,
+    shown_worth,
+)
 from silo_server.services.product.flat import FlatRow, flatten, leaves_in
 from silo_server.services.product.graph import MAX_DEPTH, Graph, load_graph
 from silo_server.services.product.line_filter import found_parts, leading_to, sought
 from silo_server.services.product.parts import RolledItem, parts_of, some_parts
 from silo_server.services.product.rollup import roll_up_cost, roll_up_mass
-from silo_server.services.product.summary import MassAndCost, Summary, in_unit_of
-from silo_server.services.product.summary_make import MOST_NAMED, own_worth
-from silo_server.services.product.summary_read import at_once, marks_of, standing_alone, summaries, summary_of
+from silo_server.services.product.summary import Summary
+from silo_server.services.product.summary_make import MOST_NAMED
+from silo_server.services.product.summary_read import (
+    at_once,
+    marks_of,
+    prices_besides,
+    product_cost,
+    standing_alone,
+    summaries,
+    summary_of,
+)
 from silo_server.services.product.where_used import use_counts, where_used
+from silo_server.services.product.worth import MassAndCost, in_unit_of
+from silo_server.services.suppliers import rates_of
 from silo_server.values import Item, Line
 from silo_server.web.accounts import Reader
 from silo_server.web.attachments import kind_words
@@ -174,12 +193,17 @@ class ShownStructure:
 
     graph
         the levels that are open, or the whole for a filter or the flat list.
+    prices
+        of the product's parts whose price depends on the quantity, for all pieces.
     """
 
-    def __init__(self, tx: Tx, graph: Graph, look: Look, page_rows: int = PAGE_ROWS) -> None:
+    def __init__(
+        self, tx: Tx, graph: Graph, look: Look, prices: Mapping[int, PartCost], page_rows: int = PAGE_ROWS
+    ) -> None:
         self._tx = tx
         self.graph = graph
         self.look = look
+        self.prices = prices
         self.page_rows = page_rows
         self._lines = dict(graph.lines)
         self._worths: dict[int, MassAndCost] = {}
@@ -225,11 +249,25 @@ class ShownStructure:
         # A filter has read all of them.
         parts = self.parts if self.look.is_filtered else some_parts(self._tx, children)
         by_item = summaries(self._tx, {child for child in children if parts[child].has_bom})
-        return {
-            child: (parts[child], found.as_part if found else own_worth(parts[child].properties), found)
+        worths = {
+            child: by_item[child].as_part if child in by_item else own_worth(child, parts[child])
             for child in children
-            for found in [by_item.get(child)]
         }
+        self.prices = prices_besides(self._tx, worths.values(), self.prices)
+        return {
+            child: (parts[child], at_prices(worth, self.prices), by_item.get(child))
+            for child, worth in worths.items()
+        }
+
+    def worth_of_part(self, row: FlatRow) -> MassAndCost:
+        """Return mass and cost of one unit of a row of the flat list, to sort by it."""
+        child = row.line.child_id
+        return self._known({child})[child][1] if child not in self._worths else self._worths[child]
+
+    def read_worths(self, rows: Sequence[FlatRow]) -> None:
+        """Read mass and cost of all rows of the flat list at once, before they are sorted by it."""
+        known = self._known({row.line.child_id for row in rows})
+        self._worths |= {child: worth for child, (_part, worth, _summary) in known.items()}
 
     def dressed(self, rows: Sequence[tuple[StructureRow, Sequence[str]]]) -> list[Branch]:
         """Give the rows everything that they show; beside each row come the doubts of its line."""
@@ -238,10 +276,7 @@ class ShownStructure:
         def dress(row: StructureRow, doubts: Sequence[str]) -> Branch:
             child = row.line.child_id
             part, worth, summary = known[child]
-            if not row.flat:
-                worth = in_unit_of(row.line, worth)
-            elif UNIT_OPEN in doubts:
-                worth = worth._replace(mass_whole=False, cost_whole=False)
+            worth = shown_worth(worth, {}, doubts) if row.flat else in_unit_of(row.line, worth)
             if summary is None:
                 return Branch(row.line, part, row.depth, row.total, row.unit, worth, doubts)
             marks = [*summary.inside(child, is_open=row.is_open), *doubts]
@@ -347,6 +382,8 @@ def _tree_keys(shown: ShownStructure) -> Mapping[str, Callable[[Line], Any]]:
 def flat_page(shown: ShownStructure) -> Page[Branch]:
     """Make a page of the leaf parts, each with its total over the whole tree."""
     look = shown.look
+    if look.sort:
+        shown.read_worths(shown.found)
     rows = arranged(shown.found, look.sort, _flat_keys(shown))
     table = page_of(rows, len(shown.leaves), look.page, shown.page_rows)
     here = shown.dressed(
@@ -363,7 +400,7 @@ def _flat_keys(shown: ShownStructure) -> Mapping[str, Callable[[FlatRow], Any]]:
         return shown.parts[row.line.child_id].properties
 
     keys: dict[str, Callable[[FlatRow], Any]] = _keys(
-        lambda row: row.line, lambda row: row.total, lambda row: own_worth(properties(row))
+        lambda row: row.line, lambda row: row.total, shown.worth_of_part
     )
     return keys | {
         "type": lambda row: row.line.child_item_type,
@@ -471,18 +508,21 @@ def structure_of(tx: Tx, item: Item, look: Look, size: int = PAGE_ROWS) -> dict[
     last = last_sync(tx, item)
     values: dict[str, Any] = {"last": last, "gaps": in_sentences(last.own_gaps), "problem": ""}
     values |= {"held_gaps": in_sentences(last.held_gaps)}
-    values |= dict.fromkeys(("table", "totals", "of_all")) | dict.fromkeys(("levels", "depth"), 0)
+    values |= dict.fromkeys(("table", "totals", "of_all", "cost_of_one"))
+    values |= dict.fromkeys(("levels", "depth"), 0)
     values |= {"above": ()} | dict.fromkeys(("has_mass", "has_cost", "has_supplier"), False)
     try:
         summary = summary_of(tx, item)
-        values |= {"of_all": summary, "totals": Totals.of(summary)}
+        cost = product_cost(tx, summary, look.pieces)
+        of_one = cost if look.pieces == 1 else product_cost(tx, summary)
+        values |= {"of_all": summary, "cost_of_one": of_one, "totals": Totals.of(summary, cost, look.pieces)}
         counts = summary.levels
         if not counts:
             return values
         depth = look.depth or (len(counts) if size > PAGE_ROWS else usual_depth(counts))
         look = replace(look, depth=depth)
         values |= {"levels": len(counts), "depth": depth}
-        values |= {"has_mass": summary.worth.mass is not None, "has_cost": bool(summary.worth.costs)}
+        values |= {"has_mass": summary.worth.mass is not None, "has_cost": bool(cost.totals)}
         whole = look.is_flat or look.is_filtered
         if whole and summary.lines > MOST_READ:
             raise TooLargeError(
@@ -493,9 +533,9 @@ def structure_of(tx: Tx, item: Item, look: Look, size: int = PAGE_ROWS) -> dict[
                     most=MOST_READ,
                 )
             )
-        shown = ShownStructure(tx, load_graph(tx, item, None if whole else depth), look, size)
+        shown = ShownStructure(tx, load_graph(tx, item, None if whole else depth), look, cost.prices, size)
         if look.is_filtered:
-            values |= {"totals": Totals.narrow(tx, shown.graph, shown.found, shown.parts)}
+            values |= {"totals": Totals.narrow(tx, shown)}
         if look.is_flat:
             flat = flat_page(shown)
             supplied = any(row.part.properties.get("supplier") for row in flat.rows)
@@ -508,39 +548,38 @@ def structure_of(tx: Tx, item: Item, look: Look, size: int = PAGE_ROWS) -> dict[
 
 @dataclass(frozen=True, slots=True)
 class Totals:
-    """What the shown parts weigh [kg] and cost; how many of how many state none, and the first of them."""
+    """What all pieces of the shown parts weigh [kg] and cost; how many state none, and the first of them."""
 
     mass: Decimal | float | None
-    costs: Mapping[str, Decimal | float]
-    parts: int
+    costs: Mapping[str, Decimal]
     no_mass: int
     no_cost: int
     mass_missing: Sequence[str]
     cost_missing: Sequence[str]
 
     @classmethod
-    def of(cls, summary: Summary) -> Totals:
-        """Take the totals of a whole product from its summary."""
-        same = {name: getattr(summary, name) for name in names_of(cls) if name not in ("mass", "costs")}
-        return cls(summary.worth.mass, summary.worth.costs, **same)
+    def of(cls, summary: Summary, cost: ProductCost, pieces: int) -> Totals:
+        """Take the totals of a whole product from its summary and its cost."""
+        mass = _times(pieces, summary.worth.mass)
+        missing = summary.mass_missing, cost.missing
+        return cls(mass, cost.totals, summary.no_mass, cost.unknown, *missing)
 
     @classmethod
-    def narrow(
-        cls,
-        tx: Tx,
-        graph: Graph,
-        found: Sequence[FlatRow],
-        parts: Mapping[int, RolledItem],
-    ) -> Totals:
-        """Add up the totals of what a filter has found."""
+    def narrow(cls, tx: Tx, shown: ShownStructure) -> Totals:
+        """Add up the totals of what a filter has found, at the prices of the whole product."""
+        graph, found, parts, pieces = shown.graph, shown.found, shown.parts, shown.look.pieces
         leaves = leaves_in(graph, found)
         alone = set() if leaves is found else standing_alone(tx, graph)
-        cost = roll_up_cost(leaves, parts)
+        whole = bought_whole(graph, parts)
+        costed = leaves_in(graph, found, whole) if whole else leaves
+        prices = prices_in(graph, parts, rates_of(tx), pieces)
+        lacking = {row.line.child_id for row in costed} - prices.keys()  # what is found in a bought assembly
+        prices |= {part_id: part_cost(parts[part_id], Decimal(1), rates_of(tx)) for part_id in lacking}
+        cost = roll_up_cost(costed, parts, prices, pieces)
         weighed = roll_up_mass(leaves_in(graph, found, alone) if alone else leaves, parts, alone)
         return cls(
-            weighed.total or None,
+            _times(pieces, as_decimal(weighed.total)) or None,
             cost.totals,
-            len(cost.rows),
             len(weighed.missing),
             len(cost.missing),
             sorted(weighed.missing)[:MOST_NAMED],

@@ -160,6 +160,7 @@ def _some(rows: Sequence[OrderRow]) -> dict[str, bool]:
     return {
         "ordered": any(row.ordered for row in rows),
         "mass": any(row.mass for row in rows),
+        "price": any(row.cost.price is not None for row in rows if row.kind != orders.BOUGHT),
         "material": any(row.item.properties.get("material") for row in rows),
     }
 

@@ -19,13 +19,16 @@ from silo_server.routes.releases import frozen_now
 from silo_server.services import releases
 from silo_server.services.access.users import get_user
 from silo_server.services.items import get_item
+from silo_server.services.product.cost import bought_whole, prices_in, with_costs
 from silo_server.services.product.flat import flatten
 from silo_server.services.product.frozen import ProductContent, frozen_files, frozen_product
 from silo_server.services.product.graph import MAX_DEPTH
-from silo_server.services.product.summary import in_unit_of
+from silo_server.services.product.rollup import roll_up_cost
 from silo_server.services.product.summary_read import summary_of
 from silo_server.services.product.tree import expand
+from silo_server.services.product.worth import in_unit_of
 from silo_server.services.releases import Release
+from silo_server.services.suppliers import rates_of
 from silo_server.values import Item
 from silo_server.web.accounts import Reader, Writer
 from silo_server.web.attachments import kind_words
@@ -141,6 +144,9 @@ def release_page(
         item = get_item(tx, part_number, include_archived=True)
         release = releases.get_release(tx, item, label)
         product = frozen_product(tx, item, release)
+        graph, prices = product.graph, prices_in(product.graph, product.parts, rates_of(tx))
+        product = product._replace(worths=with_costs(graph, product.parts, product.worths, prices))
+        cost = roll_up_cost(flatten(graph, bought_whole(graph, product.parts)), product.parts, prices)
         models, beside = frozen_files(tx, release.record)
         approvals = releases.approvals_of(tx, release)
         numbered = [other for other in releases.list_releases(tx, item) if other.status in releases.NUMBERED]
@@ -159,6 +165,7 @@ def release_page(
         at=at,
         flat=view == "flat",
         worth=product.worths[product.graph.root.id],
+        cost=cost,
         files=sorted(models, key=lambda other: other["file_path"] or other["file_name"]),
         attachments=beside,
         kinds=kind_words(),

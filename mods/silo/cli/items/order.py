@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from rich.text import Text
 
 from silo import spoken
 from silo.bom.errors import Exit, counted
+from silo.bom.message import Message, counted_message, message
 from silo.cli.connection import client_of, named_item
 from silo.cli.json_output import print_json
 from silo.cli.options import above_zero, add_each, add_old_name, add_options, only_with
@@ -83,19 +85,39 @@ def _print_order(order: OrderList) -> None:
     empty = SupplierPart(supplier="", currency="")
     for part in sorted(order.parts, key=lambda part: (part.kind, (part.supplier_part or empty).supplier)):
         of = part.supplier_part or empty
-        price = f"{part.quantity} at {part.price} {of.currency}" if part.price else part.quantity or ""
+        price = f"{part.quantity or part.needed} at {part.price} {part.currency}" if part.price else ""
+        price = price or part.quantity or ""
         cells = (
             *(spoken(part.kind), part.part_number, part.name, f"{part.needed} {part.unit or ''}"),
             *(part.ordered, spoken(price), of.supplier, of.number),
-            f"{part.cost or ''} {of.currency}".strip(),
+            f"{part.cost or ''} {part.currency or ''}".strip(),
             "; ".join((*map(spoken, part.remarks), *(file.name for file in part.files))),
         )
         table.add_row(*(Text(plain(cell)) for cell in cells))
     if order.parts:
         out.print(table)
         days = "not known" if order.lead_time_days is None else counted(order.lead_time_days, "day")
-        cost, without = f"{order.total_cost} {order.currency}", counted(order.unpriced, "part")
-        total = f"Cost: {cost}, without {without}" if order.unpriced else f"Cost: {cost}"
-        if not any(part.cost for part in order.parts):
-            total = "Cost: not priced"
-        out.print(Text(spoken(f"{total}\nLongest lead time: {days}")))
+        for line in _sums(order):
+            out.print(Text(plain(spoken(line))))
+        out.print(Text(plain(spoken(f"Longest lead time: {days}"))))
+
+
+def _sums(order: OrderList) -> list[Message]:
+    """Say what the parts cost, for how many that is not known, and what is paid for whole packs."""
+    if not order.costs:
+        return [message("Cost: not priced")]
+    cost = message("Cost: {cost}", cost=_money(order.costs))
+    if order.unpriced:
+        cost = counted_message(
+            order.unpriced,
+            "Cost: {cost}, not known for {n} part",
+            "Cost: {cost}, not known for {n} parts",
+            cost=_money(order.costs),
+        )
+    if not order.order_costs or order.order_costs == order.costs:
+        return [cost]
+    return [cost, message("To be paid, in whole packs: {cost}", cost=_money(order.order_costs))]
+
+
+def _money(costs: Mapping[str, str]) -> str:
+    return " + ".join(f"{cost} {currency}" for currency, cost in costs.items())

@@ -11,7 +11,7 @@ from silo_server.routes.bom import bom_router
 from silo_server.routes.call import Viewer
 from silo_server.services.items import get_item
 from silo_server.services.product.summary import Summary
-from silo_server.services.product.summary_read import summary_of
+from silo_server.services.product.summary_read import product_cost, summary_of
 from silo_server.times import wire_time
 
 router = bom_router("bom")
@@ -35,17 +35,21 @@ def get_summary(call: Viewer, part_number: str) -> dict[str, Any]:
     with call.read() as tx:
         item = get_item(tx, part_number)
         summary = summary_of(tx, item)
-    costs = summary.worth.costs.items()
+        cost = product_cost(tx, summary)
     return {
         "part_number": item.part_number,
         **open_to_wire(summary),
         "questions": summary.questions,
-        **to_wire(summary, "open", "worth", "as_part", "levels", "no_mass", "no_cost", "changed"),
+        **to_wire(
+            summary, "open", "worth", "as_part", "levels", "no_mass", "no_cost", "open_graded", "changed"
+        ),
         "levels": len(summary.levels),
         "total_mass_kg": plain(summary.worth.mass),
-        "totals": [{"currency": currency, "total_cost": plain(cost)} for currency, cost in costs],
+        "totals": [
+            {"currency": currency, "total_cost": plain(total)} for currency, total in cost.totals.items()
+        ],
         "mass_missing": {"count": summary.no_mass, "first": list(summary.mass_missing)},
-        "cost_missing": {"count": summary.no_cost, "first": list(summary.cost_missing)},
+        "cost_missing": {"count": cost.unknown, "first": list(cost.missing)},
         "last_change": {
             "at": wire_time(summary.changed.at),
             "user": summary.changed.username,

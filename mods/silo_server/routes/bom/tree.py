@@ -20,6 +20,7 @@ from silo_server.routes.models import LineOut
 from silo_server.services.bom.line_wire import child_to_wire, line_state_to_wire, revisions_to_wire
 from silo_server.services.items import get_item
 from silo_server.services.product.amounts import unit_is_open
+from silo_server.services.product.cost import bought_whole, prices_in
 from silo_server.services.product.flat import flatten
 from silo_server.services.product.graph import MAX_DEPTH, load_graph
 from silo_server.services.product.parts import parts_of, positive_number
@@ -27,6 +28,7 @@ from silo_server.services.product.rollup import roll_up_cost, roll_up_mass
 from silo_server.services.product.summary_read import standing_alone, summary_of
 from silo_server.services.product.tree import Occurrence, expand
 from silo_server.services.product.where_used import where_used
+from silo_server.services.suppliers import rates_of
 from silo_server.values import LineState
 
 router = bom_router("bom")
@@ -73,15 +75,20 @@ def get_flat(call: Viewer, part_number: str) -> dict[str, Any]:
 
 @router.get("/cost")
 def get_cost(call: Viewer, part_number: str) -> dict[str, Any]:
-    """Return the flat BOM × ``standard_cost``, per currency; ``missing`` names the parts without a cost."""
+    """Return the cost of one piece part by part, per currency; ``missing`` names the parts without a cost.
+
+    A bought assembly is one part.
+    """
     with call.server.large_reads.enter(), call.read() as tx:
         graph = load_graph(tx, get_item(tx, part_number))
-        cost = roll_up_cost(flatten(graph), parts_of(tx, graph))
-    only = next(iter(cost.totals.values())) if len(cost.totals) == 1 else None
+        parts = parts_of(tx, graph)
+        flat = flatten(graph, bought_whole(graph, parts))
+        cost = roll_up_cost(flat, parts, prices_in(graph, parts, rates_of(tx)))
+    only = plain(next(iter(cost.totals.values()))) if len(cost.totals) == 1 else None
     return {
         "part_number": graph.root.part_number,
         "total_cost": only if cost.totals else 0.0,
-        "totals": [{"currency": c, "total_cost": t} for c, t in cost.totals.items()],
+        "totals": [{"currency": c, "total_cost": plain(t)} for c, t in cost.totals.items()],
         "complete": not cost.missing,
         "missing": list(cost.missing),
         "lines": [row._asdict() for row in cost.rows],

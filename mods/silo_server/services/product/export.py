@@ -18,17 +18,19 @@ from silo.bom.quantities import as_decimal, plain
 from silo_server.db.transaction import Tx
 from silo_server.services.bom.last_sync import in_sentences, last_syncs
 from silo_server.services.items import get_item
-from silo_server.services.product.amounts import UNIT_OPEN, Exact, product
+from silo_server.services.product.amounts import Exact, product
+from silo_server.services.product.cost import PartCost, own_worth, prices_in, shown_worth, with_costs
 from silo_server.services.product.flat import flatten
 from silo_server.services.product.frozen import changes_of, frozen_product
 from silo_server.services.product.graph import MAX_DEPTH, load_graph
 from silo_server.services.product.line_filter import found_below, leading_to, sought
 from silo_server.services.product.parts import RolledItem, portions, some_parts
-from silo_server.services.product.summary import MassAndCost, OpenBom, Summary, in_unit_of
-from silo_server.services.product.summary_make import own_worth
-from silo_server.services.product.summary_read import summaries, summary_of
+from silo_server.services.product.summary import OpenBom, Summary
+from silo_server.services.product.summary_read import prices_besides, product_cost, summaries, summary_of
 from silo_server.services.product.tree import Occurrence, expand
+from silo_server.services.product.worth import MassAndCost, in_unit_of
 from silo_server.services.releases import get_release
+from silo_server.services.suppliers import rates_of
 from silo_server.times import wire_time
 from silo_server.values import Item, Line
 
@@ -107,9 +109,16 @@ def export(
     filtered = bool(words or item_type)
     levels = 1 if view is View.SINGLE and not filtered else None  # a filter shows what leads to its parts
     graph = frozen.graph if frozen else load_graph(tx, root, levels, bare=True)
-    root, open_boms = graph.root, frozen.open if frozen else summary_of(tx, root).open
-    summed: Mapping[int, Summary] = {}
-    if not frozen:
+    root, summed = graph.root, dict[int, Summary]()
+    open_boms: Mapping[int, OpenBom]
+    prices: Mapping[int, PartCost]
+    worths: Mapping[int, MassAndCost] = {}
+    if frozen:
+        open_boms, prices = frozen.open, prices_in(graph, frozen.parts, rates_of(tx), pieces)
+        worths = with_costs(graph, frozen.parts, frozen.worths, prices)
+    else:
+        whole = summary_of(tx, root)
+        open_boms, prices = whole.open, product_cost(tx, whole, pieces).prices
         below = [line.child_id for line in graph.lines.get(root.id, ())] if levels else graph.lines
         summed = summaries(tx, {*below} - {root.id})
     # What a sync left out has no number, supplier or type: a filter finds none of it.
@@ -134,16 +143,22 @@ def export(
     def dressed(bare: Iterable[_BareColumns]) -> Iterator[Row]:
         for portion in portions(bare):
             parts = frozen.parts if frozen else some_parts(tx, {cells.line.child_id for cells in portion})
+            found, known = worths, prices
+            if not frozen:
+                found = {
+                    part_id: summed[part_id].as_part if part_id in summed else own_worth(part_id, part)
+                    for part_id, part in parts.items()
+                }
+                known = prices_besides(tx, found.values(), prices)
             for cells in portion:
                 child = cells.line.child_id
                 amount = None if cells.total is None else product(cells.total, pieces)
-                part, summary, bom = parts[child], summed.get(child), open_boms.get(child)
-                worth = summary.as_part if summary else own_worth(part.properties)
-                worth = frozen.worths[child] if frozen else worth
+                part, bom = parts[child], open_boms.get(child)
+                worth = found[child]
                 if view is not View.FLAT:
-                    worth = in_unit_of(cells.line, worth)
-                elif UNIT_OPEN in cells.doubts:
-                    worth = worth._replace(mass_whole=False, cost_whole=False)
+                    worth = in_unit_of(cells.line, shown_worth(worth, known))
+                else:
+                    worth = shown_worth(worth, known, cells.doubts)
                 fields = {"Incomplete": bom.incomplete or None if bom else None}
                 fields["Open"] = ", ".join(cells.doubts) or None
                 fields[PICTURE] = part.thumbnail_key

@@ -36,12 +36,15 @@ from silo_server.services.product.changes import (
     line_happened,
     what_changed,
 )
+from silo_server.services.product.cost import PartCost, at_prices, part_cost
 from silo_server.services.product.graph import Graph, load_graph, order_of
 from silo_server.services.product.moments import moment
-from silo_server.services.product.parts import RolledItem, with_supplier
-from silo_server.services.product.summary import MassAndCost, OpenBom, Summary
+from silo_server.services.product.parts import RolledItem, some_parts, with_supplier
+from silo_server.services.product.summary import OpenBom, Summary
 from silo_server.services.product.summary_read import summaries
+from silo_server.services.product.worth import MassAndCost
 from silo_server.services.releases import FrozenProduct, Release, find_release, item_of, read_records
+from silo_server.services.suppliers import rates_of
 from silo_server.user_json import dumps
 from silo_server.values import Item, Line, bought
 
@@ -66,6 +69,7 @@ def freeze(tx: Tx, item: Item) -> FrozenProduct:
     ids = graph.names().keys()
     items = by_ids(tx, ids)
     worths = summaries(tx, ids)
+    prices = _own_prices(tx, worths)
     files, beside = _files(tx, items), attachments_of(tx, ids)
     without_file = [part for part in items.values() if not files[part.id]]
     hashes: dict[int, str] = {}
@@ -86,7 +90,8 @@ def freeze(tx: Tx, item: Item) -> FrozenProduct:
         # A file may lie in the product without a link that leads to it, if a user uploaded it.
         files[item_id] = {**files[item_id], **{k: v for child in below for k, v in files[child].items()}}
         written = [files[item_id][document] for document in sorted(files[item_id])]
-        text = dumps(_record(items[item_id], worths[item_id], written, beside.get(item_id, ()), lines))
+        worth = at_prices(worths[item_id].as_part, prices[item_id])
+        text = dumps(_record(items[item_id], worth, written, beside.get(item_id, ()), lines))
         hashes[item_id] = hashlib.sha256(text.encode()).hexdigest()
         records[hashes[item_id]] = text
     blocks = [f"{bom.part_number}: {bom.words}" for bom in worths[item.id].open.values()]
@@ -100,6 +105,17 @@ def freeze(tx: Tx, item: Item) -> FrozenProduct:
     return FrozenProduct(hashes[item.id], records, sorted(blocks), tx.stamp)
 
 
+def _own_prices(tx: Tx, summaries_by_item: Mapping[int, Summary]) -> dict[int, Mapping[int, PartCost]]:
+    """Find the graded prices of each item for one piece of it."""
+    graded = {item_id: summary.as_part.graded for item_id, summary in summaries_by_item.items()}
+    parts = some_parts(tx, {part_id for held in graded.values() for part_id in held})
+    rates = rates_of(tx) if parts else {}
+    return {
+        item_id: {part_id: part_cost(parts[part_id], amount, rates) for part_id, amount in held.items()}
+        for item_id, held in graded.items()
+    }
+
+
 def _is_modelled(item: Item) -> bool:
     """Report whether the site makes an item itself, and so needs its model and its drawings."""
     return item.item_type in ("part", "assembly") and not item.is_bought
@@ -107,12 +123,11 @@ def _is_modelled(item: Item) -> bool:
 
 def _record(
     item: Item,
-    summary: Summary,
+    worth: MassAndCost,
     files: Sequence[Mapping[str, Any]],
     beside: Sequence[Attachment],
     lines: Sequence[Mapping[str, Any]],
 ) -> dict[str, Any]:
-    worth = summary.as_part
     attached = [
         {
             "document": attachment.id,
@@ -268,7 +283,13 @@ def _part(made: Mapping[str, Any]) -> RolledItem:
     properties = with_supplier(made.get("properties", {}), listed)
     is_bought = bought(sourcing, properties.get("supplier"))
     return RolledItem(
-        *texts, properties, made.get("thumbnail"), is_bought, sourcing_type=sourcing, supplier_parts=listed
+        *texts,
+        properties,
+        made.get("thumbnail"),
+        is_bought,
+        sourcing_type=sourcing,
+        supplier_parts=listed,
+        unit=made.get("unit"),
     )
 
 

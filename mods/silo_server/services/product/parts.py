@@ -47,11 +47,30 @@ class RolledItem(NamedTuple):
     sourcing_type: str | None = None
     supplier_parts: Sequence[Mapping[str, Any]] = ()
     archived_at: str | None = None
+    unit: str | None = None
 
 
 def parts_of(tx: Tx, graph: Graph) -> dict[int, RolledItem]:
     """Read what roll-ups need of all items in the graph, by internal id."""
     return some_parts(tx, graph.names())
+
+
+_row = items.c
+# What :func:`rolled_item` reads, in its order.
+ROLLED = (
+    _row.id,
+    _row.part_number,
+    _row.name,
+    _row.description,
+    _row.properties,
+    _row.thumbnail_key,
+    _row.supplier_parts,
+    _row.sourcing_type,
+    _row.item_type,
+    _row.bom_version,
+    _row.archived_at,
+    _row.unit,
+)
 
 
 # What is stored is whole: without a look for spaces around it, in half the time.
@@ -60,32 +79,22 @@ _read_json = json.JSONDecoder().raw_decode
 
 def some_parts(tx: Tx, item_ids: Collection[int]) -> dict[int, RolledItem]:
     """Read what roll-ups need of these items, by internal id."""
-    row = items.c
-    query = select(
-        row.id,
-        row.part_number,
-        row.name,
-        row.description,
-        row.properties,
-        row.thumbnail_key,
-        row.supplier_parts,
-        row.sourcing_type,
-        row.item_type,
-        row.bom_version,
-        row.archived_at,
-    ).where(one_of(tx, row.id, item_ids))
-    parts = {}
-    for part_id, number, name, about, text, key, offers, sourcing, kind, version, archived in tx.conn.execute(
-        query
-    ):
-        properties, listed = _read_json(text)[0], json.loads(offers) if offers else ()
-        if listed:
-            properties = with_supplier(properties, listed)
-        is_bought, has_bom = bought(sourcing, properties.get("supplier")), kind == "assembly" or version > 0
-        parts[part_id] = RolledItem(
-            number, name, about, properties, key, is_bought, has_bom, sourcing, listed, archived
-        )
-    return parts
+    query = select(*ROLLED).where(one_of(tx, items.c.id, item_ids))
+    return dict(map(rolled_item, tx.conn.execute(query)))
+
+
+def rolled_item(row: Sequence[Any]) -> tuple[int, RolledItem]:
+    """Make an item, with its internal id, from a row that begins with :data:`ROLLED`."""
+    part_id, number, name, about, text, key, offers, sourcing, kind, version, archived, unit = row[
+        : len(ROLLED)
+    ]
+    properties, listed = _read_json(text)[0], json.loads(offers) if offers else ()
+    if listed:
+        properties = with_supplier(properties, listed)
+    is_bought, has_bom = bought(sourcing, properties.get("supplier")), kind == "assembly" or version > 0
+    return part_id, RolledItem(
+        number, name, about, properties, key, is_bought, has_bom, sourcing, listed, archived, unit
+    )
 
 
 def with_supplier(
@@ -100,8 +109,8 @@ def with_supplier(
 
 
 def currency_of(properties: Mapping[str, Any]) -> str:
-    """Return the currency of an item's cost; :data:`DEFAULT_CURRENCY` if it states none."""
-    return str(properties.get("currency") or DEFAULT_CURRENCY)
+    """Return the currency of an item's cost as it is typed; :data:`DEFAULT_CURRENCY` if it states none."""
+    return str(properties.get("currency") or DEFAULT_CURRENCY).strip().upper()
 
 
 _NUMBER = int | float | Decimal

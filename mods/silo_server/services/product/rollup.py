@@ -12,20 +12,22 @@ from decimal import Decimal
 from typing import NamedTuple
 
 from silo.bom.quantities import exact_product, exact_sum, plain
+from silo_server.services.product.cost import PartCost, added_up
 from silo_server.services.product.flat import FlatRow
-from silo_server.services.product.parts import RolledItem, currency_of, positive_number
+from silo_server.services.product.parts import RolledItem, positive_number
 
 
 class CostRow(NamedTuple):
-    """A leaf part's share, as the API sends it. ``standard_cost`` None = not stated."""
+    """A part's share, as the API sends it. ``unit_cost`` None = not known; ``source``: where it is from."""
 
     part_number: str
     name: str
     total_quantity: float
     unit: str | None
-    standard_cost: float | None
+    unit_cost: float | None
     currency: str | None
     total_cost: float | None
+    source: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +35,7 @@ class CostRollup:
     """What an assembly costs; ``totals`` per currency, ``missing`` the part numbers without a cost."""
 
     rows: Sequence[CostRow]
-    totals: Mapping[str, float]
+    totals: Mapping[str, Decimal]
     missing: Sequence[str]
 
 
@@ -61,22 +63,39 @@ class MassRollup:
     missing: Sequence[str]
 
 
-def roll_up_cost(flat: Iterable[FlatRow], parts: Mapping[int, RolledItem]) -> CostRollup:
-    """Add up the cost of the flat BOM from the parts' ``standard_cost``, per currency."""
-    rows, costs, missing = [], dict[str, list[Decimal]](), dict[str, None]()
+def roll_up_cost(
+    flat: Iterable[FlatRow],
+    parts: Mapping[int, RolledItem],
+    prices: Mapping[int, PartCost],
+    pieces: int = 1,
+) -> CostRollup:
+    """Add up the cost of rows of the flat list, in which a bought assembly is a part, per currency.
+
+    prices
+        what each part costs for its whole quantity (:func:`silo_server.services.product.cost.prices_in`).
+    """
+    rows, costs, missing = [], list[PartCost](), list[str]()
     for row in flat:
-        item = parts[row.line.child_id]
-        cost, currency, total = positive_number(item.properties, "standard_cost"), None, None
-        if cost is None or row.unit_open:
-            missing[item.part_number] = None
-        if cost is not None and row.total:
-            currency = currency_of(item.properties)
-            exact = exact_product((cost, row.total))
-            costs.setdefault(currency, []).append(exact)
-            total = float(exact)
-        rows.append(CostRow(item.part_number, item.name, plain(row.total), row.unit, cost, currency, total))
-    totals = {currency: float(exact_sum(of_it)) for currency, of_it in costs.items()}
-    return CostRollup(rows, totals, list(missing))
+        item, amount = parts[row.line.child_id], exact_product((row.total, pieces))
+        of_row = prices[row.line.child_id]._replace(quantity=amount)
+        if of_row.price is None or row.unit_open:
+            missing.append(item.part_number)
+        total = of_row.cost if amount else None
+        if total is not None:
+            costs.append(of_row)
+        rows.append(
+            CostRow(
+                item.part_number,
+                item.name,
+                plain(amount),
+                row.unit,
+                plain(of_row.price),
+                of_row.currency,
+                plain(total),
+                of_row.words,
+            )
+        )
+    return CostRollup(rows, added_up(costs), missing)
 
 
 def roll_up_mass(

@@ -5,21 +5,19 @@ Every view, export and answer shows it and counts nothing itself.
 
 A line in a unit of another kind than its part's is open: it counts in no sum, and what it holds is without a
 value. Mass: each leaf's ``mass_kg`` [kg] times its total quantity. If something below a sub-assembly has no
-mass but the sub-assembly states ``mass_kg``, that stands for the whole of it. Cost: each leaf's
-``standard_cost``, per ``currency``.
+mass but the sub-assembly states ``mass_kg``, that stands for the whole of it. Cost: per currency, as
+:mod:`silo_server.services.product.cost` has it; a bought assembly counts with its own price.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from decimal import Decimal
 from typing import NamedTuple
 
 from silo.bom.errors import counted
-from silo.bom.quantities import exact_product
-from silo_server.services.product.amounts import UNIT_OPEN, of_one
-from silo_server.values import Line
+from silo_server.services.product.amounts import UNIT_OPEN
+from silo_server.services.product.worth import MassAndCost
 
 
 class OpenBom(NamedTuple):
@@ -48,33 +46,6 @@ class OpenBom(NamedTuple):
         return ", ".join(filter(None, (self.questions, self.incomplete)))
 
 
-class MassAndCost(NamedTuple):
-    """What one piece of an item weighs [kg] and costs, per currency; of an assembly, all that is in it.
-
-    ``whole``: nothing that belongs to it is without a value.
-    """
-
-    mass: Decimal | None
-    mass_whole: bool
-    costs: Mapping[str, Decimal]
-    cost_whole: bool
-
-
-NOTHING_KNOWN = MassAndCost(None, mass_whole=False, costs={}, cost_whole=False)
-
-
-def in_unit_of(line: Line, worth: MassAndCost) -> MassAndCost:
-    """Return what one unit of a line weighs and costs, from what one unit of its child does."""
-    if line.state.unit is None and line.child_unit is None:
-        return worth
-    one = of_one(line)
-    if one is None:
-        return NOTHING_KNOWN
-    mass = None if worth.mass is None else exact_product((worth.mass, one))
-    costs = {currency: exact_product((cost, one)) for currency, cost in worth.costs.items()}
-    return worth._replace(mass=mass, costs=costs)
-
-
 class LastChange(NamedTuple):
     """When something of the product changed last, who did it, and to which item."""
 
@@ -96,7 +67,9 @@ class Summary:
     parts, assemblies, lines
         how many different leaf parts and sub-assemblies are in it, and lines in all their BOMs.
     no_mass, no_cost
-        how many of the parts lack a value that nothing above them states.
+        how many of the parts lack a value that nothing above them states, but for graded prices.
+    open_graded
+        parts of a graded price (internal ids) that ``no_cost`` counts, as a line of theirs has an open unit.
     mass_missing, cost_missing
         the first of their part numbers.
     outdated
@@ -116,6 +89,7 @@ class Summary:
     outdated: int = 0
     mass_missing: Sequence[str] = ()
     cost_missing: Sequence[str] = ()
+    open_graded: Sequence[int] = ()
 
     def open_boms(self, but: int | None = None) -> list[tuple[str, str]]:
         """List (part number, what is open there) of each BOM except ``but``, by part number."""

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import select
 
 from silo.bom.errors import BusyError
-from silo.bom.quantities import as_decimal, exact_product, exact_sum
+from silo.bom.quantities import exact_product, exact_sum
 from silo_server.db.rows import one_of
 from silo_server.db.tables import bom_changes, bom_lines, items, product_summaries
 from silo_server.db.transaction import Tx
@@ -26,9 +26,11 @@ from silo_server.services.bom.conflicts import conflicts_in
 from silo_server.services.bom.last_sync import NEVER, last_syncs
 from silo_server.services.bom.lines import select_lines, to_line
 from silo_server.services.product.amounts import amount_of, unit_is_open
+from silo_server.services.product.cost import own_worth
 from silo_server.services.product.graph import MAX_DEPTH, children_first
-from silo_server.services.product.parts import currency_of, positive_number
-from silo_server.services.product.summary import LastChange, MassAndCost, OpenBom, Summary
+from silo_server.services.product.parts import ROLLED, rolled_item
+from silo_server.services.product.summary import LastChange, OpenBom, Summary
+from silo_server.services.product.worth import MassAndCost
 from silo_server.user_json import dumps
 from silo_server.values import Line
 
@@ -45,8 +47,12 @@ class Node(NamedTuple):
         of what has a BOM, itself included → [its lines, those of them that name an older revision].
     weighed
         of what its mass is made of: the leaf parts, and assemblies that state their mass for all in them.
-    first_parts, first_weighed
-        the first part numbers of ``parts`` and ``weighed``.
+    costed
+        of what its cost is made of where it is a part: the leaf parts, and bought assemblies.
+    no_cost_above
+        those of ``costed`` that have no cost.
+    first_parts, first_weighed, first_costed, first_no_cost_above
+        the first part numbers of these.
     """
 
     summary: Summary
@@ -55,8 +61,12 @@ class Node(NamedTuple):
     no_cost: Set[int]
     assemblies: Mapping[int, Sequence[int]]
     weighed: Set[int]
+    costed: Set[int]
+    no_cost_above: Set[int]
     first_parts: Sequence[str]
     first_weighed: Sequence[str]
+    first_costed: Sequence[str]
+    first_no_cost_above: Sequence[str]
 
 
 class Built(NamedTuple):
@@ -145,31 +155,22 @@ class _Own(NamedTuple):
 
     part_number: str
     is_assembly: bool
+    is_bought: bool
     worth: MassAndCost
     changed: LastChange
 
 
 def _own(tx: Tx, item_ids: Collection[int]) -> dict[int, _Own]:
     row = items.c
-    query = select(
-        row.id,
-        row.part_number,
-        row.item_type,
-        row.properties,
-        row.updated_at,
-        row.updated_by,
-    )
-    return {
-        item_id: _Own(number, kind == "assembly", own_worth(json.loads(text)), LastChange(at, by, number))
-        for item_id, number, kind, text, at, by in tx.conn.execute(query.where(one_of(tx, row.id, item_ids)))
-    }
-
-
-def own_worth(properties: Mapping[str, Any]) -> MassAndCost:
-    """Read the mass [kg] and the cost that an item states itself."""
-    mass, cost = positive_number(properties, "mass_kg"), positive_number(properties, "standard_cost")
-    costs = {currency_of(properties): as_decimal(cost)} if cost is not None else {}
-    return MassAndCost(None if mass is None else as_decimal(mass), mass is not None, costs, bool(costs))
+    query = select(*ROLLED, row.updated_at, row.updated_by).where(one_of(tx, row.id, item_ids))
+    found: dict[int, _Own] = {}
+    for item_row in tx.conn.execute(query):
+        item_id, part = rolled_item(item_row)
+        changed = LastChange(item_row.updated_at, item_row.updated_by, part.part_number)
+        worth = own_worth(item_id, part)
+        is_assembly = item_row.item_type == "assembly"
+        found[item_id] = _Own(part.part_number, is_assembly, part.is_bought, worth, changed)
+    return found
 
 
 def _open(tx: Tx, lines: Mapping[int, Sequence[Line]], own: Mapping[int, _Own]) -> dict[int, OpenBom]:
@@ -223,6 +224,10 @@ class _Maker:
         worth = _sum_of(below) if below else own.worth
         states_all = not worth.mass_whole and own.worth.mass is not None
         as_part = worth._replace(mass=own.worth.mass, mass_whole=True) if states_all else worth
+        bought_whole = bool(below) and own.is_bought
+        if bought_whole:  # its own price counts, and not that of what is in it
+            of_own = own.worth
+            as_part = as_part._replace(costs=of_own.costs, cost_whole=of_own.cost_whole, graded=of_own.graded)
         open_ones = {part_id: bom for node in nodes for part_id, bom in node.summary.open.items()}
         changes = [own.changed, *(node.summary.changed for node in nodes)]
         if item_id in self.open:
@@ -233,10 +238,15 @@ class _Maker:
         parts = me.union(*(node.parts for node in nodes))
         unweighed = [node for node in nodes if not node.summary.as_part.mass_whole]
         no_mass = (set() if worth.mass_whole else me).union(*(node.no_mass for node in unweighed))
-        no_cost = (set() if worth.cost_whole else me).union(*(node.no_cost for node in nodes))
+        no_cost = (set() if worth.cost_whole else me).union(*(node.no_cost_above for node in nodes))
         uncounted = [node for line, node in below if unit_is_open(line)]
         no_mass = no_mass.union(*(node.weighed for node in uncounted))
-        no_cost = no_cost.union(*(node.parts for node in uncounted))
+        no_cost = no_cost.union(*(node.costed for node in uncounted))
+        alone = {item_id} if bought_whole or me else set[int]()
+        costed = alone or set[int]().union(*(node.costed for node in nodes))
+        no_cost_above = no_cost
+        if bought_whole:
+            no_cost_above = set() if own.worth.cost_whole else {item_id}
         itself = {item_id} if states_all or me else set[int]()
         weighed = itself or set[int]().union(*(node.weighed for node in nodes))
         assemblies = {part_id: counts for node in nodes for part_id, counts in node.assemblies.items()}
@@ -262,15 +272,31 @@ class _Maker:
             cost_missing=_first(
                 me & no_cost,
                 own,
-                *(node.summary.cost_missing for node in nodes),
-                *(node.first_parts for node in uncounted),
+                *(node.first_no_cost_above for node in nodes),
+                *(node.first_costed for node in uncounted),
             ),
+            open_graded=sorted(no_cost & worth.graded.keys()),
         )
         if lines or own.is_assembly:
             assemblies[item_id] = (len(lines), older)
         first_parts = _first(me, own, *(node.first_parts for node in nodes))
         first_weighed = _first(itself, own, *(() if itself else (node.first_weighed for node in nodes)))
-        return Node(summary, parts, no_mass, no_cost, assemblies, weighed, first_parts, first_weighed)
+        first_costed = _first(alone, own, *(() if alone else (node.first_costed for node in nodes)))
+        first_above = _first(no_cost_above, own) if bought_whole else summary.cost_missing
+        return Node(
+            summary,
+            parts,
+            no_mass,
+            no_cost,
+            assemblies,
+            weighed,
+            costed,
+            no_cost_above,
+            first_parts,
+            first_weighed,
+            first_costed,
+            first_above,
+        )
 
 
 def _first(me: Collection[int], own: _Own, *below: Sequence[str]) -> list[str]:
@@ -280,6 +306,7 @@ def _first(me: Collection[int], own: _Own, *below: Sequence[str]) -> list[str]:
 def _sum_of(below: Sequence[tuple[Line, Node]]) -> MassAndCost:
     mass: Decimal | None = None
     costs: dict[str, Decimal] = {}
+    graded: dict[int, Decimal] = {}
     parts = [node.summary.as_part for _, node in below]
     counted = True
     for (line, _), worth in zip(below, parts, strict=True):
@@ -290,11 +317,13 @@ def _sum_of(below: Sequence[tuple[Line, Node]]) -> MassAndCost:
             mass = exact_sum((mass or Decimal(0), exact_product((quantity, worth.mass))))
         for currency, cost in worth.costs.items():
             costs[currency] = exact_sum((costs.get(currency, Decimal(0)), exact_product((quantity, cost))))
+        for part_id, held in worth.graded.items():
+            graded[part_id] = exact_sum((graded.get(part_id, Decimal(0)), exact_product((quantity, held))))
     whole = (
         counted and all(worth.mass_whole for worth in parts),
         counted and all(worth.cost_whole for worth in parts),
     )
-    return MassAndCost(mass, whole[0], costs, whole[1])
+    return MassAndCost(mass, whole[0], costs, whole[1], graded)
 
 
 def _levels(rows: int, below: Iterable[Sequence[int]]) -> list[int]:
@@ -307,6 +336,10 @@ def _row(item_id: int, node: Node) -> dict[str, Any]:
     sets = {name: sorted(getattr(node, name)) for name in ("parts", "no_mass", "no_cost")}
     if node.weighed != node.parts:
         sets["weighed"] = sorted(node.weighed)
+    if node.costed != node.parts:
+        sets["costed"] = sorted(node.costed)
+    if node.no_cost_above != node.no_cost:
+        sets["no_cost_above"] = sorted(node.no_cost_above)
     return {
         "item_id": item_id,
         "summary": json.dumps(summary, separators=(",", ":"), default=str),
@@ -316,6 +349,8 @@ def _row(item_id: int, node: Node) -> dict[str, Any]:
                 "assemblies": node.assemblies,
                 "first_parts": node.first_parts,
                 "first_weighed": node.first_weighed,
+                "first_costed": node.first_costed,
+                "first_no_cost_above": node.first_no_cost_above,
             }
         ),
     }
@@ -325,9 +360,12 @@ def stored_summary(text: str) -> Summary:
     """Read a summary as it is kept."""
     loads = json.loads(text)
     for name in ("worth", "as_part"):
-        mass, mass_whole, costs, cost_whole = loads[name]
+        mass, mass_whole, costs, cost_whole, graded = loads[name]
         exact = {currency: Decimal(cost) for currency, cost in costs.items()}
-        loads[name] = MassAndCost(None if mass is None else Decimal(mass), mass_whole, exact, cost_whole)
+        held = {int(part_id): Decimal(amount) for part_id, amount in graded.items()}
+        loads[name] = MassAndCost(
+            None if mass is None else Decimal(mass), mass_whole, exact, cost_whole, held
+        )
     loads["open"] = {int(parent_id): OpenBom(*values) for parent_id, values in loads["open"].items()}
     return Summary(**loads | {"changed": LastChange(*loads["changed"])})
 
@@ -337,5 +375,7 @@ def _node(row: Any) -> Node:
     parts, no_mass, no_cost = (frozenset(sets[name]) for name in ("parts", "no_mass", "no_cost"))
     assemblies = {int(item_id): counts for item_id, counts in sets["assemblies"].items()}
     weighed = frozenset(sets.get("weighed", parts))
-    firsts = (sets["first_parts"], sets["first_weighed"])
-    return Node(stored_summary(row.summary), parts, no_mass, no_cost, assemblies, weighed, *firsts)
+    costed, above = frozenset(sets.get("costed", parts)), frozenset(sets.get("no_cost_above", no_cost))
+    firsts = (sets["first_parts"], sets["first_weighed"], sets["first_costed"], sets["first_no_cost_above"])
+    summary = stored_summary(row.summary)
+    return Node(summary, parts, no_mass, no_cost, assemblies, weighed, costed, above, *firsts)
