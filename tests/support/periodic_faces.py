@@ -8,7 +8,7 @@ say what a file says, and not what the kernel would have made of them.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -246,9 +246,11 @@ def _tube(angle: float) -> tuple[Floats, Floats, Floats]:
     return RING * out, out, np.cross(Z, out)
 
 
-def _sector(start: float, angle: float, vertex: float) -> Writer:
+def _sector(
+    start: float, angle: float, vertex: float, torus: Callable[[Writer], int] | None = None
+) -> Writer:
     w = Writer()
-    surface = w.add(f"TOROIDAL_SURFACE('',#{w.axes((0, 0, 0), Z, X)},{RING!r},{TUBE!r})")
+    surface = (torus or _plain_torus)(w)
     rings = []
     for u in (start, start + angle):
         at, out, along = _tube(u)
@@ -317,6 +319,70 @@ def _bite(at: float, seam: float, cap: bool) -> Writer:
     # The curve is counter-clockwise as seen from +x, where the cap is.
     w.face(surface, [w.bound((edge, cap))])
     w.face(w.plane((at, 0, 0), -X if cap else X, Y), [w.bound((edge, not cap))])
+    return w
+
+
+def belts() -> Iterator[Case]:
+    """A ball between two planes: with equal rims, belt and caps have the same vector area."""
+    for low, high in ((-12.0, 12.0), (-20.0, 5.0), (3.0, 21.0)):
+        poles = {
+            "axis": Z,
+            "flat": X,
+            "tilted": turned(Z, Y, 0.5),
+            "rim": turned(Z, Y, math.acos(high / BALL)),
+            "below-rim": turned(Z, Y, math.acos(high / BALL) + 0.1),
+        }
+        for how, pole in poles.items():
+            for edges in ("circle", "arcs"):
+                volume = _cap(high) - _cap(low)
+                yield Case(f"belt-{low:g}-{high:g}-{how}-{edges}", _belt(low, high, pole, edges), volume)
+
+
+def _belt(low: float, high: float, pole: Floats, edges: str) -> Writer:
+    w = Writer()
+    across = np.cross(pole, Z if abs(pole @ Z) < 0.9 else X)
+    sphere = w.add(
+        f"SPHERICAL_SURFACE('',#{w.axes((0, 0, 0), pole, across / np.linalg.norm(across))},{BALL!r})"
+    )
+    bottom, top = (_ring(w, h * Z, Z, X, math.sqrt(BALL**2 - h**2), edges) for h in (low, high))
+    w.face(
+        sphere,
+        [w.bound(*[(e, True) for e in bottom]), w.bound(*[(e, False) for e in reversed(top)], outer=False)],
+    )
+    w.face(w.plane(low * Z, -Z, X), [w.bound(*[(e, False) for e in reversed(bottom)])])
+    w.face(w.plane(high * Z, Z, X), [w.bound(*[(e, True) for e in top])])
+    return w
+
+
+def tyres() -> Iterator[Case]:
+    """A torus cut by a cylinder around its axis: the outer part, with a wall inside, and the inner part."""
+    for wall in (RING, 37.0, 44.0):
+        height = math.sqrt(TUBE**2 - (wall - RING) ** 2)
+        for outer in (True, False):
+            for flip in (1, -1):
+                for vertex in (0.0, 1.0):
+                    rho = (
+                        np.linspace(wall, RING + TUBE, 400_001)
+                        if outer
+                        else np.linspace(RING - TUBE, wall, 400_001)
+                    )
+                    high = np.sqrt(np.maximum(TUBE**2 - (rho - RING) ** 2, 0))
+                    slices = 4 * math.pi * rho * high
+                    volume = float(((slices[1:] + slices[:-1]) / 2 * np.diff(rho)).sum())
+                    name = f"{'tyre' if outer else 'hub'}-{wall:g}-{flip}-{vertex:g}"
+                    yield Case(name, _tyre(wall, height, outer, flip, vertex), volume)
+
+
+def _tyre(wall: float, height: float, outer: bool, flip: int, vertex: float) -> Writer:
+    w = Writer()
+    surface = w.add(f"TOROIDAL_SURFACE('',#{w.axes((0, 0, 0), flip * Z, X)},{RING!r},{TUBE!r})")
+    cylinder = w.add(f"CYLINDRICAL_SURFACE('',#{w.axes((0, 0, 0), Z, X)},{wall!r})")
+    x = turned(X, Z, vertex)
+    (low,) = _ring(w, -height * Z, Z, x, wall)
+    (high,) = _ring(w, height * Z, Z, x, wall)
+    # Around the axis, the outer part is to the left of the lower ring, as of the whole pipe.
+    w.face(surface, [w.bound((low, outer)), w.bound((high, not outer), outer=False)])
+    w.face(cylinder, [w.bound((low, not outer)), w.bound((high, outer), outer=False)], not outer)
     return w
 
 
@@ -412,9 +478,49 @@ def _wedge(kind: str, start: float, angle: float) -> tuple[Writer, float]:
     return w, volume * angle / (2 * math.pi)
 
 
+def wound() -> Iterator[Case]:
+    """A torus as a closed rational B-spline surface: sectors beside and over its seam."""
+    for start, angle in ((0.0, math.pi), (0.3, 1.0), (-0.5, 1.0), (2.0, 5.0), (-3.0, 6.2)):
+        for vertex in (0.0, 1.0):
+            volume = math.pi * TUBE**2 * RING * angle
+            yield Case(
+                f"wound-{start:g}-{angle:.2g}-{vertex:g}",
+                _sector(start, angle, vertex, _spline_torus),
+                volume,
+            )
+
+
+_SQUARE = ((1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1), (1, 0))
+_WEIGHTS = [1.0, math.sqrt(0.5)] * 4 + [1.0]
+
+
+def _spline_torus(w: Writer) -> int:
+    rows, weights = [], []
+    for (cu, su), wu in zip(_SQUARE, _WEIGHTS, strict=True):
+        row = []
+        for cv, sv in _SQUARE:
+            out = RING + TUBE * cv
+            row.append(w.point((out * cu, out * su, TUBE * sv)))
+        rows.append(f"({_refs(row)})")
+        weights.append("(" + ",".join(repr(wu * wv) for wv in _WEIGHTS) + ")")
+    knots = "(3,2,2,2,3),(3,2,2,2,3),(0.,1.,2.,3.,4.),(0.,1.,2.,3.,4.),.UNSPECIFIED."
+    return w.add(
+        f"(BOUNDED_SURFACE()B_SPLINE_SURFACE(2,2,({','.join(rows)}),.UNSPECIFIED.,.T.,.T.,.F.)"
+        f"B_SPLINE_SURFACE_WITH_KNOTS({knots})GEOMETRIC_REPRESENTATION_ITEM()"
+        f"RATIONAL_B_SPLINE_SURFACE(({','.join(weights)}))REPRESENTATION_ITEM('')SURFACE())"
+    )
+
+
+def _plain_torus(w: Writer) -> int:
+    return w.add(f"TOROIDAL_SURFACE('',#{w.axes((0, 0, 0), Z, X)},{RING!r},{TUBE!r})")
+
+
 def cases() -> Iterator[Case]:
     """All of them."""
     yield from balls()
     yield from tori()
     yield from bites()
     yield from pipes()
+    yield from belts()
+    yield from tyres()
+    yield from wound()

@@ -300,9 +300,9 @@ def face_rebuilt_note(faces: int, before_m3: float, after_m3: float) -> Note:
 
 
 def face_differs_note(faces: int, doubt_m3: float, volume_m3: float) -> Note:
-    """Note spherical faces that do not lie between their edges."""
+    """Note curved faces that do not lie between their edges."""
     words = (
-        f"{counted(faces, 'spherical face does', 'spherical faces do')} not lie between the edges that the "
+        f"{counted(faces, 'curved face does', 'curved faces do')} not lie between the edges that the "
         f"file has: some {doubt_m3 * 1e6:.3g} of {volume_m3 * 1e6:.4g} cm³ are in doubt"
     )
     return Note(GeometryCode.FACE_DIFFERS, words)

@@ -328,7 +328,7 @@ def _with_faces_read_again(
     data = text.source.read_bytes()
     best, left = step, doubts
     turns: dict[int, SphereTurn] = {}
-    for attempt in range(READINGS):
+    for attempt in range(READINGS if any(doubt.spheres for doubt in doubts.values()) else 0):
         spheres = [sphere for doubt in left.values() for sphere in doubt.spheres]
         places = _places(best, [e for sphere in spheres for e in (sphere.entity, sphere.centre_entity)])
         for sphere, face, centre in zip(spheres, places[::2], places[1::2], strict=True):
@@ -342,15 +342,15 @@ def _with_faces_read_again(
         again, remaining = _walked(step.path, prefix, replace(text, source=source, products=products))
         if sum(d.doubt for d in remaining.values()) < sum(d.doubt for d in left.values()):
             best, left = again, remaining
-        if not left:
+        if not any(doubt.spheres for doubt in left.values()):
             break
     for key, doubt in doubts.items():
         notes = []
-        if best is not step:
+        if best is not step and doubt.spheres:
             before, after = (_volume_m3(read.shapes.get(key, ())) for read in (step, best))
             notes.append(face_rebuilt_note(len(doubt.spheres), before, after))
-        if (rest := left.get(key)) is not None:
-            notes.append(face_differs_note(len(rest.spheres), rest.doubt * MM**3, rest.volume * MM**3))
+        if (rest := left.get(key)) is not None and rest.counts:
+            notes.append(face_differs_note(rest.faces, rest.doubt * MM**3, rest.volume * MM**3))
         best.problems[key] = (*best.problems.get(key, ()), *notes)
     return best
 
@@ -418,7 +418,11 @@ class _StepWalk:
 
     def misread(self) -> dict[str, file_faces.Doubt]:
         """Find the products with faces that differ from their edges as the file has them."""
-        found = {key: file_faces.misread(shapes, self._transfer) for key, shapes in self._file.shapes.items()}
+        facts = self._file.facts
+        found = {
+            key: file_faces.misread(shapes, self._transfer, facts[key].unit_mm)
+            for key, shapes in self._file.shapes.items()
+        }
         return {key: doubt for key, doubt in found.items() if doubt is not None}
 
     def _complete(self) -> None:

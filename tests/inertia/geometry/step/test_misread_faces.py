@@ -7,6 +7,7 @@ The truth is closed-form volumes of solids that are written as text, and a part 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -45,6 +46,8 @@ def test_a_face_cut_near_its_seam_or_pole_is_right_or_warned(name: str, tmp_path
     case = ALL[name]
     part = _part(case, tmp_path)
     off = abs(part.volume_m3 * 1e9 / case.volume - 1)
+    if GeometryCode.BODY_MISSING in _codes(part):
+        return  # the kernel makes no solid of it, and the warning says that its volume is missing
     if _codes(part) - {GeometryCode.FACE_REBUILT}:
         assert off < 2e-3
     else:
@@ -70,9 +73,22 @@ def test_what_no_reading_can_settle_is_warned_with_its_size(tmp_path: Path) -> N
     assembly = geometry.read(path, options=ReadOptions(isolate=False, cache=False))
     (part,) = assembly.prototypes.values()
     (note,) = (note for note in part.problems if note.code == GeometryCode.FACE_DIFFERS)
-    assert note.message.startswith("1 spherical face does not lie between the edges that the file has: some ")
+    assert note.message.startswith("1 curved face does not lie between the edges that the file has: some ")
     assert note.message.endswith("are in doubt")
     assert GeometryCode.FACE_REBUILT not in _codes(part)
+
+
+def test_a_belt_is_told_from_the_two_caps_beside_it(tmp_path: Path) -> None:
+    """Their vector areas are both zero; only the area says which is meant."""
+    part = _part(ALL["belt--12-12-rim-circle"], tmp_path)
+    assert part.volume_m3 * 1e9 == pytest.approx(ALL["belt--12-12-rim-circle"].volume, rel=RIGHT)
+    assert _codes(part) == {GeometryCode.FACE_REBUILT}
+
+
+def test_a_torus_as_a_closed_spline_is_integrated_over_its_own_turn(tmp_path: Path) -> None:
+    """The kernel's own integral of it is 0.5 % too large, and claims eight digits."""
+    case = ALL["wound-0-3.1-0"]
+    assert _part(case, tmp_path).volume_m3 * 1e9 == pytest.approx(case.volume, rel=1e-6)
 
 
 def test_healthy_cuts_are_not_warned_of(tmp_path: Path) -> None:
@@ -99,6 +115,32 @@ def test_the_witness_is_the_closed_form_of_a_cap(tmp_path: Path) -> None:
     assert sphere.by_edges() == pytest.approx(np.array([0.0, 0.0, expected]), abs=1e-3)
 
 
+PATCHES = ["torus-0-3.1-0", "torus--0.5-1-1", "bowl-4-1", "bite-46-0-cap", "bite-43-1.5-rest", "tyre-40-1-0",
+           "tyre-37--1-1", "hub-44-1-0", "wound-0.3-1-0"]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", PATCHES)
+def test_the_other_part_of_a_surface_that_closes_is_noticed(name: str, tmp_path: Path) -> None:
+    """With its edges passed the other way round, a face is the other part of its surface."""
+    quiet()
+    walked = step.load(ALL[name].writer.write(tmp_path / "part.step"))
+    transfer = walked.kept[1].Reader().WS().TransferReader()
+    patches = [
+        patch
+        for shapes in walked.shapes.values()
+        for shape in shapes
+        for face in file_faces.occt.faces_of(shape)
+        for patch in file_faces.patches_of(face, transfer, 1.0)
+    ]
+    assert patches
+    assert [patch.difference() for patch in patches] == [0.0] * len(patches)
+    turned = [
+        replace(patch, loops=[(points, -steps) for points, steps in patch.loops]).difference()
+        for patch in patches
+    ]
+    assert turned[0] > file_faces.SLIGHT * patches[0].size ** 3
+
+
 @pytest.mark.skipif(not HEAD_BACK.is_file(), reason="the part of strangers is not beside the checkout")
 def test_a_real_part_that_weighed_38_times_too_much() -> None:
     """A half shell of radii 59 and 60 with a tube of radii 17 and 18 on it, 70 long: in closed form."""
@@ -109,3 +151,4 @@ def test_a_real_part_that_weighed_38_times_too_much() -> None:
     (part,) = assembly.prototypes.values()
     assert part.volume_m3 * 1e9 == pytest.approx(shell + tube, rel=RIGHT)
     assert GeometryCode.FACE_REBUILT in _codes(part)
+    assert GeometryCode.FACE_DIFFERS not in _codes(part)

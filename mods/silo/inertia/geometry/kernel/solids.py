@@ -304,7 +304,9 @@ _Range = tuple[float, float]
 def _drawn(curve: Any, along: Floats, u_range: _Range, v_range: _Range) -> Nurbs:
     periodic = curve.IsPeriodic()
     if periodic:
+        turn = curve.FirstParameter(), curve.LastParameter()
         curve.SetNotPeriodic()
+        curve.Segment(*turn)  # with knots of a full order at both ends: the turn's own
     rows = range(1, curve.NbPoles() + 1)
     poles = np.array([xyz(curve.Pole(i)) for i in rows])
     weights = np.array([curve.Weight(i) for i in rows]) if curve.IsRational() else None
@@ -315,10 +317,13 @@ def _drawn(curve: Any, along: Floats, u_range: _Range, v_range: _Range) -> Nurbs
 
 def _nurbs(spline: Any, u_range: _Range, v_range: _Range) -> Nurbs:
     u_periodic, v_periodic = spline.IsUPeriodic(), spline.IsVPeriodic()
+    u_first, u_last, v_first, v_last = spline.Bounds()
     if u_periodic:
         spline.SetUNotPeriodic()
     if v_periodic:
         spline.SetVNotPeriodic()
+    if u_periodic or v_periodic:  # with knots of a full order at both ends: the turn's own
+        spline.Segment(u_first, u_last, v_first, v_last)
     rows, columns = range(1, spline.NbUPoles() + 1), range(1, spline.NbVPoles() + 1)
     weights = None
     if spline.IsURational() or spline.IsVRational():
