@@ -154,7 +154,8 @@ sys.stdout.flush()' </dev/null 2>/dev/null | awk '$1 == "SILO" { print $2, $3 }'
 
 install_dependencies() {
   local python=$1 target="$CACHE/deps/py${1//./}"
-  [ -e "$target/.silo-complete" ] && return
+  # The folder says what it was completed with: other dependencies complete it anew.
+  [ "$(cat "$target/.silo-complete" 2>/dev/null)" = "${DEPENDENCIES[*]}" ] && return
   local pip=("$REPO/.venv/bin/python" -m pip)
   [ -x "${pip[0]}" ] || pip=(python3 -m pip)
   say "Python $python: installing ${DEPENDENCIES[*]}"
@@ -162,7 +163,7 @@ install_dependencies() {
   "${pip[@]}" -q install --upgrade --target "$target" --python-version "$python" --implementation cp \
     --only-binary=:all: "${DEPENDENCIES[@]}" ||
     { say "Python $python: pip could not load ${DEPENDENCIES[*]}; GUI tests for it will skip"; return 0; }
-  touch "$target/.silo-complete"
+  echo "${DEPENDENCIES[*]}" >"$target/.silo-complete"
 }
 
 write_wrappers() {
