@@ -23,6 +23,7 @@ import numpy as np
 
 from silo.bom.errors import DocumentError
 from silo.bom.walk.document import LinkProblem
+from silo.budget import Budget
 from silo.fcstd import Library
 from silo.inertia.geometry.freecad import (
     NOTHING,
@@ -36,6 +37,7 @@ from silo.inertia.geometry.freecad import (
 )
 from silo.inertia.geometry.graph import Floats
 from silo.inertia.geometry.helpers import WORTH_HELP, Helpers, Task
+from silo.inertia.geometry.limits import MODEL
 from silo.inertia.geometry.measured import Measured
 from silo.inertia.geometry.options import ReadOptions, Report
 from silo.inertia.geometry.reading import GeometryReading
@@ -252,8 +254,9 @@ class StoredFacts:
 class Entries:
     """Side entries of FCStd files. Files stay open until :meth:`close`."""
 
-    def __init__(self) -> None:
+    def __init__(self, budget: Budget = MODEL) -> None:
         self._open: dict[str, zipfile.ZipFile] = {}
+        self._account = budget.account("the shapes")
 
     def _info(self, path: str, name: str) -> tuple[zipfile.ZipFile, zipfile.ZipInfo]:
         if path not in self._open:
@@ -266,6 +269,7 @@ class Entries:
             archive, info = self._info(path, name)
             if info.file_size > MAX_ENTRY_BYTES:
                 raise DocumentError(path, f"its {name} would unpack to {info.file_size / 1e9:.1f} GB")
+            self._account.take_bytes(info.file_size)  # zipfile unpacks no more than that
             return archive.read(info)
         except KeyError as error:
             raise DocumentError(path, f"its {name} is missing") from error

@@ -36,9 +36,11 @@ from silo.bom.walk.kinds import REPEATERS, Kind, is_container, is_named_assembly
 from silo.bom.walk.roots import choose_assembly, seen_beside, silent_reader
 from silo.bom.walk.standard import STANDARD_PARTS
 from silo.bom.walk.targets import Step, is_assembly_link, is_link
+from silo.budget import Account
 from silo.inertia.assembly import Assembly, Prototype
 from silo.inertia.geometry import measured as checks
 from silo.inertia.geometry.graph import MAX_DEPTH, Child, Floats, Node, in_metres, unfold
+from silo.inertia.geometry.limits import MODEL
 from silo.inertia.geometry.measured import Measured
 from silo.inertia.geometry.options import ReadOptions, Report
 from silo.inertia.materials.cards import card_of
@@ -182,6 +184,8 @@ class Walk:
 
     hardware
         False leaves standard parts out.
+    account
+        of the placements that are made.
     """
 
     facts: ShapeSource
@@ -193,6 +197,7 @@ class Walk:
     absent: set[str] = field(default_factory=set)
     _noted: dict[str, list[str]] = field(default_factory=dict)
     _open: list[str] = field(default_factory=list)
+    account: Account = field(default_factory=lambda: MODEL.account("the model"))
 
     def __post_init__(self) -> None:
         self._reader = silent_reader(
@@ -389,6 +394,7 @@ class Walk:
         paths = [()] if count.beside else contents.tree.paths(shown.key)
         for path in paths:
             around = np.linalg.inv(self.facts.placement(container)) if count.beside else np.eye(4)
+            self.account.take_objects()
             first = moved.get(object_name((*path, shown.obj)[0]))
             for number, holder in enumerate(path):
                 own_place = self.facts.placement(holder)
@@ -453,6 +459,7 @@ class Walk:
             if not places:
                 words = f"the array “{label_of(obj)}” was saved without its placements; counted once"
                 self._note("not_counted", words)
+            self.account.take_objects(len(seen) * max(len(places), 1))
             left_out = [bool(left_out_by(element)) for element in draft_elements(obj)]
             for number, place in enumerate(places or [np.eye(4)]):
                 if number >= len(left_out) or not left_out[number]:
@@ -481,6 +488,7 @@ class Walk:
         own_parts = is_assembly_link(node.obj)
         for inner in below:
             seen = list(self._placed(inner, key, own_parts or is_placed))
+            self.account.take_objects(len(seen) * len(around))
             for place in around:
                 yield from _moved_by(place, seen)
 
@@ -499,6 +507,8 @@ class Walk:
             if is_link(obj) or derived(obj, "App::LinkElement"):
                 here = here @ scale(obj)
                 places = [here @ place for place in self._element_places(obj, step.index)]
+            if len(places) > 1:
+                self.account.take_objects(len(around) * len(places))
             around = [outer @ place for outer in around for place in places]
         return around
 
@@ -517,6 +527,8 @@ class Walk:
             return [np.eye(4)]
         if count > MAX_ELEMENTS:
             raise DocumentError(file_of(link), f"the link {link.Name} claims {count} elements")
+        if index is None and count > self.account.budget.objects:  # before a list of them is made
+            self.account.take_objects(count)
         if len(listed_ones := elements(link)) == count:
             wanted = listed_ones if index is None else listed_ones[index : index + 1]
             return [

@@ -85,7 +85,7 @@ def read_here(path: Path, options: ReadOptions, report: Report, helpers: Helpers
         return _reading(path, options, report, helpers)
     except (DocumentError, ConfigError):
         raise
-    except InputError as error:  # of a structure that does not end
+    except InputError as error:  # of a structure that does not end, or that asks for too much
         raise DocumentError(str(path), str(error)) from error
 
 
