@@ -33,6 +33,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
+from operator import itemgetter
 from pathlib import Path
 
 from silo_server.services.bom.line_edit import REL_TYPES
@@ -380,6 +381,10 @@ def texts_of_sentences(path: Path) -> Iterator[tuple[str, str, Path]]:
     found: list[tuple[int, int, str]] = []
     tree = ast.parse(path.read_text("utf-8"), str(path))
     without = {id(inner) for part in _other_texts(tree, path) for inner in ast.walk(part)}
+    templates: list[tuple[int, int, str, str]] = []
+    for text, many, literals in _templates(tree, path):
+        templates.append((literals[0].lineno, literals[0].col_offset, text, many))
+        without.update(map(id, literals))
     for node in ast.walk(tree):
         # Docstrings; what is compared; the parts of a literal, and its formats.
         if isinstance(node, ast.Expr | ast.Compare | ast.JoinedStr | ast.Subscript | ast.MatchValue):
@@ -389,20 +394,47 @@ def texts_of_sentences(path: Path) -> Iterator[tuple[str, str, Path]]:
         match node:
             case ast.Call(func=ast.Name("counted"), args=[_, ast.Constant(str(one)), *many]):
                 plurals = [word.value for word in many if isinstance(word, ast.Constant)] or [f"{one}s"]
-                found += [(node.lineno, 0, f"{{n}} {word}") for word in (one, *plurals)]
+                found += [(node.lineno, 0, f"{{n}} {word}") for word in plurals]
         for child in ast.iter_child_nodes(node):
-            if not isinstance(child, ast.Constant | ast.JoinedStr):
+            if not isinstance(child, ast.Constant | ast.JoinedStr) or id(child) in without:
                 continue
             lines = _pattern_of(child).split("\n")
             # Many lines are a program, a style or a schema; those of the command line are a help.
             is_text = len(lines) < 4 or "cli" in path.parts
             if is_text and not (isinstance(node, ast.Dict) and child in node.keys):
                 found += [(child.lineno, child.col_offset, line) for line in lines]
-    for _line, _column, text in sorted(found):
-        if not _NO_TEXT.search(text):
+    all_found: list[tuple[int, int, str, str | None]] = [*((*one, None) for one in found), *templates]
+    for _line, _column, text, many in sorted(all_found, key=itemgetter(0, 1)):
+        if many is not None:
+            if re.search("[A-Za-z]", re.sub(r"\{\w+\}", "", text)):
+                yield text, many, path
+        elif not _NO_TEXT.search(text):
             core = _core(text)
             if re.search("[A-Za-z]{2}", re.sub(r"\{\w+\}", "", core)) and " " in core:
                 yield core, "", path
+
+
+def _templates(tree: ast.Module, path: Path) -> Iterator[tuple[str, str, list[ast.expr]]]:
+    """Yield the templates of messages, and captions: text, plural or "", and the literals."""
+    calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call)]
+    for call in sorted(calls, key=lambda call: (call.lineno, call.col_offset)):
+        match getattr(call.func, "attr", getattr(call.func, "id", "")), call.args:
+            case (("message" | "template" | "caption"), [ast.Constant(str(text)) as literal, *_]):
+                yield text, "", [literal]
+            case (("message" | "caption"), [ast.IfExp(body=body, orelse=other), *_]):
+                for literal in (body, other):
+                    if isinstance(literal, ast.Constant) and isinstance(literal.value, str):
+                        yield literal.value, "", [literal]
+            case "counted", [_, ast.Constant(str(one)) as literal, *more] if "workbench" not in path.parts:
+                many = next((word.value for word in more if isinstance(word, ast.Constant)), f"{one}s")
+                yield f"{{n}} {one}", f"{{n}} {many}", [literal, *more]
+            case "counted_message", [
+                _,
+                ast.Constant(str(one)) as literal,
+                ast.Constant(str(many)) as other,
+                *_,
+            ]:
+                yield one, many, [literal, other]
 
 
 def _other_texts(tree: ast.Module, path: Path) -> Iterator[ast.AST]:

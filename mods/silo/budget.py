@@ -135,4 +135,8 @@ def _sentence(source: str, budget: Budget, limit: Limit) -> Message:
 
 def size(count: int) -> str:
     """Write a number of bytes for people: 64 KiB, 16 MiB."""
-    return f"{count / MIB:g} MiB" if count >= MIB else f"{count / KIB:g} KiB"
+    return (
+        message("{mib} MiB", mib=f"{count / MIB:g}")
+        if count >= MIB
+        else message("{kib} KiB", kib=f"{count / KIB:g}")
+    )

@@ -67,7 +67,7 @@ def test_all_is_what_is_exported() -> None:
         _ = silo.bom.no_such_name
     code = "import sys, silo.bom.errors; print(*(n for n in sys.modules if n.startswith('silo.bom.')))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["silo.bom.errors"]
+    assert done.stdout.split() == ["silo.bom.message", "silo.bom.errors"]
 
 
 @pytest.mark.parametrize("module", MODULES)

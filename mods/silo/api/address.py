@@ -12,10 +12,11 @@ from dataclasses import dataclass
 from urllib.parse import SplitResult, quote, urljoin, urlsplit
 
 from silo.bom.errors import ConfigError, InputError
+from silo.bom.message import message
 
 _DEFAULT_PORTS = {"http": 80, "https": 443}
 _LOOPBACK = ("localhost", "::1")
-_ADVICE = "write it like https://silo.example.com or http://127.0.0.1:8080"
+_ADVICE = message("write it like https://silo.example.com or http://127.0.0.1:8080")
 
 Origin = tuple[str, str, int]
 
@@ -72,7 +73,13 @@ class ServerAddress:
         text = f"http://{text}" if here else text
         parts = _http(text)
         if any(ord(c) <= 32 or ord(c) == 127 for c in text) or parts.query or parts.fragment:
-            raise ConfigError(f"{text!r}: a server address has no blanks, no ? and no #; {_ADVICE}")
+            raise ConfigError(
+                message(
+                    "{text}: a server address has no blanks, no ? and no #; {advice}",
+                    text=repr(text),
+                    advice=_ADVICE,
+                )
+            )
         path = re.sub("/+", "/", parts.path).rstrip("/")
         host = (parts.hostname or "").rstrip(".")
         port = f":{parts.port}" if parts.port not in (None, _DEFAULT_PORTS[parts.scheme]) else ""
@@ -103,7 +110,10 @@ class ServerAddress:
             # Every HTTP library resolves "." and "..": such a part number would ask for something else.
             if not text.strip(".") or not text.strip():
                 raise InputError(
-                    f"{text!r} cannot be a part number or an identity: the server could not be asked for it"
+                    message(
+                        "{text} cannot be a part number or an identity: the server could not be asked for it",
+                        text=repr(text),
+                    )
                 )
         return "/".join((self.api_root, *(quote(text, safe="") for text in segments)))
 
@@ -115,7 +125,9 @@ class ServerAddress:
         if url is None:
             return f"{self.web_root}/{path.lstrip('/')}"
         if origin_of(url) != self.origin:
-            raise InputError(f"{url}: this page is not on {self.host}; it is not opened")
+            raise InputError(
+                message("{url}: this page is not on {host}; it is not opened", url=url, host=self.host)
+            )
         return url
 
 
@@ -125,14 +137,17 @@ def _http(url: str) -> SplitResult:
         parts = urlsplit(url)
         port_is_valid = parts.port is None or parts.port > 0
     except ValueError:
-        raise ConfigError(f"the server address cannot be read; {_ADVICE}") from None
+        raise ConfigError(message("the server address cannot be read; {advice}", advice=_ADVICE)) from None
     if parts.username is not None or parts.password is not None:
         # Never quoted in the message: it holds a password.
         raise ConfigError(
-            f"the server address holds a user name; leave it out, a token says who you are; {_ADVICE}"
+            message(
+                "the server address holds a user name; leave it out, a token says who you are; {advice}",
+                advice=_ADVICE,
+            )
         )
     if parts.scheme not in _DEFAULT_PORTS or not parts.hostname or not port_is_valid:
-        raise ConfigError(f"{url!r} is not a server address; {_ADVICE}")
+        raise ConfigError(message("{url} is not a server address; {advice}", url=repr(url), advice=_ADVICE))
     return parts
 
 

@@ -15,6 +15,7 @@ from silo.api.revisions import checksum_of, has_model
 from silo.api.transport import Cancel
 from silo.api.wire import Revision
 from silo.bom.errors import ConflictError, NotFoundError
+from silo.bom.message import message
 from silo.platform import scratch_folder
 
 if TYPE_CHECKING:
@@ -44,8 +45,13 @@ class MayHaveArrivedError(ConflictError):
     def __init__(self, part_number: str, sent: SentFile, revisions: Sequence[int]) -> None:
         numbers = ", ".join(map(str, revisions))
         super().__init__(
-            f"{part_number}: {sent.file_name} may have arrived already, as revision {numbers}; this server "
-            "keeps no checksum to compare. Look at it in Silo: Retry sends the file, Discard does not"
+            message(
+                "{part_number}: {file_name} may have arrived already, as revision {numbers}; this server "
+                "keeps no checksum to compare. Look at it in Silo: Retry sends the file, Discard does not",
+                part_number=part_number,
+                file_name=sent.file_name,
+                numbers=numbers,
+            )
         )
         self.newest = max(revisions)
 

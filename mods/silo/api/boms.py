@@ -34,6 +34,7 @@ from silo.bom.errors import (
     ServerFaultError,
     VersionConflictError,
 )
+from silo.bom.message import message
 
 
 class BomsAnswer(Answer):
@@ -62,7 +63,9 @@ class BomCalls(Caller):
 
     def get_bom(self, part_number: str, /) -> list[BomLine]:
         """Return the BOM lines directly below an item."""
-        pages = self._all(BomLine, f"the BOM of {part_number}", *_bom(part_number))
+        pages = self._all(
+            BomLine, message("the BOM of {part_number}", part_number=part_number), *_bom(part_number)
+        )
         return _checked(part_number, [line for page, _ in pages for line in page])
 
     def get_boms(
@@ -74,7 +77,7 @@ class BomCalls(Caller):
         """
 
         def batch(some: Sequence[str]) -> dict[str, list[BomLine]]:
-            where = (f"the BOMs of {len(some)} items", "items", "boms")
+            where = (message("the BOMs of {count} items", count=len(some)), "items", "boms")
             reply = self._ask(*where, part_numbers=list(some), cancelled=cancelled)
             boms = reply.model(BomsAnswer).boms
             return {number: _checked(number, lines) for number, lines in boms.items()}
@@ -95,7 +98,11 @@ class BomCalls(Caller):
         Raises :class:`BusyError` while the server sums up a very large product.
         """
         try:
-            reply = self._get(f"the summary of {part_number}", *_bom(part_number), "summary")
+            reply = self._get(
+                message("the summary of {part_number}", part_number=part_number),
+                *_bom(part_number),
+                "summary",
+            )
         except RouteMissingError:
             return None
         return reply.model(ProductSummary)
@@ -106,7 +113,11 @@ class BomCalls(Caller):
         nothing.
         """
         query = {"from": since, **({"to": until} if until else {})}
-        where = (f"what changed in {part_number}", *_bom(part_number), "changes")
+        where = (
+            message("what changed in {part_number}", part_number=part_number),
+            *_bom(part_number),
+            "changes",
+        )
         return self._get(*where, params=query).model(ProductChanges)
 
     def get_order(self, part_number: str, /, **asked: str | int) -> OrderList:
@@ -115,19 +126,31 @@ class BomCalls(Caller):
 
         Raises :class:`RouteMissingError` from a server without order lists.
         """
-        where = (f"the order list of {part_number}", "items", part_number, "order")
+        where = (
+            message("the order list of {part_number}", part_number=part_number),
+            "items",
+            part_number,
+            "order",
+        )
         return self._get(*where, params=asked).model(OrderList)
 
     def get_order_table(self, part_number: str, end: str, /, **asked: str | int) -> bytes:
         """Return the order list as a file, ``csv`` or ``xlsx``: the parts of a ``kind``, or of a
         ``supplier``.
         """
-        where = (f"the order list of {part_number}", "items", part_number, f"order.{end}")
+        where = (
+            message("the order list of {part_number}", part_number=part_number),
+            "items",
+            part_number,
+            f"order.{end}",
+        )
         return self._get(*where, params=asked).content
 
     def get_bom_version(self, part_number: str, /) -> str | None:
         """Return the present version of the BOM, for ``if_match``; None if the server keeps none."""
-        return self._get(f"the BOM of {part_number}", *_bom(part_number)).version()
+        return self._get(
+            message("the BOM of {part_number}", part_number=part_number), *_bom(part_number)
+        ).version()
 
     def merge_bom(
         self,
@@ -192,7 +215,7 @@ class BomCalls(Caller):
         try:
             return self._change(
                 "POST",
-                f"the BOM of {part_number}",
+                message("the BOM of {part_number}", part_number=part_number),
                 *_bom(part_number),
                 "merge",
                 body=request,
@@ -224,10 +247,10 @@ class BomCalls(Caller):
 
         The fields are those of :class:`LineBody`. A merge never touches such a line.
         """
-        line = body(LineBody, {"quantity": 1, **values, "child_part_number": child}, "a BOM line")
+        line = body(LineBody, {"quantity": 1, **values, "child_part_number": child}, message("a BOM line"))
         reply = self._change(
             "POST",
-            f"{child} on the BOM of {part_number}",
+            message("{child} on the BOM of {part_number}", child=child, part_number=part_number),
             *_bom(part_number),
             body=line,
             extensions=("source", *LineTexts.model_fields.keys() - {"unit"}),
@@ -236,23 +259,39 @@ class BomCalls(Caller):
 
     def update_bom_line(self, part_number: str, child: str, /, **changes: Any) -> BomLine:
         """Change a line by hand; the fields are those of :class:`LineBody`."""
-        line = body(LineBody, changes, "a BOM line")
-        subject = f"{child} on the BOM of {part_number}"
+        line = body(LineBody, changes, message("a BOM line"))
+        subject = message("{child} on the BOM of {part_number}", child=child, part_number=part_number)
         return self._change("PUT", subject, *_bom(part_number), child, body=line).model(BomLine)
 
     def remove_bom_line(self, part_number: str, child: str, /) -> None:
         """Remove a line. A user decides this; a merge never removes one."""
-        self._delete(f"{child} on the BOM of {part_number}", *_bom(part_number), child)
+        self._delete(
+            message("{child} on the BOM of {part_number}", child=child, part_number=part_number),
+            *_bom(part_number),
+            child,
+        )
 
     def _what_is_missing(self, part_number: str, error: NotFoundError) -> NotFoundError:
         # The status alone does not say whether assembly or route is unknown; the item's own address does.
         host = self._address.host
         try:
-            self._get(f"item {part_number}", "items", part_number)
+            self._get(message("item {part_number}", part_number=part_number), "items", part_number)
         except NotFoundError:
-            return NotFoundError(f"{host} has no item {part_number}; register the assembly first ({error})")
+            return NotFoundError(
+                message(
+                    "{host} has no item {part_number}; register the assembly first ({error})",
+                    host=host,
+                    part_number=part_number,
+                    error=error,
+                )
+            )
         return RouteMissingError(
-            f"{host} knows {part_number} but not how to merge a BOM; it needs a newer Silo ({error})"
+            message(
+                "{host} knows {part_number} but not how to merge a BOM; it needs a newer Silo ({error})",
+                host=host,
+                part_number=part_number,
+                error=error,
+            )
         )
 
 
@@ -261,7 +300,11 @@ def _checked(part_number: str, lines: list[BomLine]) -> list[BomLine]:
     for line in lines:
         if line.parent_part_number and line.parent_part_number.casefold() != part_number.strip().casefold():
             raise ServerFaultError(
-                f"the BOM of {part_number}: the server answered with the BOM of {line.parent_part_number}"
+                message(
+                    "the BOM of {part_number}: the server answered with the BOM of {parent_part_number}",
+                    part_number=part_number,
+                    parent_part_number=line.parent_part_number,
+                )
             )
     return lines
 

@@ -24,6 +24,7 @@ from silo.bom.errors import (
     RejectedError,
     ServerFaultError,
 )
+from silo.bom.message import message
 from silo.bom.text import character_problem, with_allowed_characters
 
 
@@ -38,7 +39,7 @@ def as_json(data: object) -> bytes:
             written = json.dumps(_sendable(json.loads(written)), ensure_ascii=False)
         return written.encode()
     except (TypeError, ValueError, RecursionError) as error:
-        raise InputError(f"this cannot be sent as JSON: {error}") from error
+        raise InputError(message("this cannot be sent as JSON: {error}", error=error)) from error
 
 
 def _sendable(value: Any) -> Any:
@@ -112,8 +113,13 @@ class Caller:
                 return
             if not fresh:
                 raise ServerFaultError(
-                    f"{subject}: {self._address.host} has more of them than the {rows} that it shows, "
-                    "whatever page is asked for. Its administrator can make the pages of lists larger"
+                    message(
+                        "{subject}: {host} has more of them than the {rows} that it shows, whatever page is "
+                        "asked for. Its administrator can make the pages of lists larger",
+                        subject=subject,
+                        host=self._address.host,
+                        rows=rows,
+                    )
                 )
             last, more = page, {**params, **(following or {"offset": rows})}
 
@@ -219,12 +225,21 @@ def body(kind: type[Body], values: Mapping[str, Any], thing: str) -> Body:
     unknown = sorted(set(values) - set(kind.model_fields) - {"schema"})
     if unknown:
         text = ", ".join(kind.model_fields)
-        raise InputError(f"{', '.join(unknown)}: no field of {thing}; wanted some of {text}")
+        raise InputError(
+            message(
+                "{unknown}: no field of {thing}; wanted some of {text}",
+                unknown=", ".join(unknown),
+                thing=thing,
+                text=text,
+            )
+        )
     try:
         return kind.model_validate(values)
     except ValidationError as error:
         wrong = "; ".join(f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors())
-        raise InputError(f"these values do not fit {thing}: {wrong}") from error
+        raise InputError(
+            message("these values do not fit {thing}: {wrong}", thing=thing, wrong=wrong)
+        ) from error
 
 
 def _one_by_one(keys: Sequence[K], single: Callable[[K], T | None], cancelled: Cancel | None) -> dict[K, T]:

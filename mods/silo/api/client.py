@@ -32,6 +32,7 @@ from silo.api.tables import TableCalls
 from silo.api.transport import ApiCall, Cancel, Timeouts, Transport, stop_if
 from silo.api.wire import ServerState, User, login_code
 from silo.bom.errors import SiloError
+from silo.bom.message import message
 
 
 @dataclass(frozen=True)
@@ -129,7 +130,7 @@ class SiloClient(ItemCalls, BomCalls, TableCalls):
         """Return the user to whom the token belongs; raises :class:`silo.bom.errors.AuthError` if the server
         does not accept it.
         """
-        return self._get("who we are", "auth", "me").model(User)
+        return self._get(message("who we are"), "auth", "me").model(User)
 
     def begin_login(self, program: str) -> BrowserLogin | None:
         """Make a secret and the page on which a user lets this program in; None if the server has no such
@@ -142,7 +143,11 @@ class SiloClient(ItemCalls, BomCalls, TableCalls):
             return None
         secret = "silo_" + secrets.token_hex(20)
         proof = hashlib.sha256(secret.encode()).hexdigest()
-        name = f"{program} on {socket.gethostname() or 'this computer'}"
+        name = message(
+            "{program} on {gethostname}",
+            program=program,
+            gethostname=socket.gethostname() or message("this computer"),
+        )
         page = f"/login/program?name={quote(name, safe='')}&proof={proof}"
         return BrowserLogin(secret, self.web_url(page), login_code(proof))
 
@@ -167,7 +172,7 @@ class SiloClient(ItemCalls, BomCalls, TableCalls):
 
     def modules(self) -> list[str]:
         """Return the names of the server's modules that are on."""
-        answer = self._get("its modules", "modules").mapping()
+        answer = self._get(message("its modules"), "modules").mapping()
         data = answer.get("modules", answer)
         if isinstance(data, dict):
             return [name for name, on in data.items() if not isinstance(on, dict) or on.get("enabled", True)]

@@ -24,6 +24,7 @@ from typing import Any, TypeVar
 
 from silo.api.address import ServerAddress, same_server
 from silo.bom.errors import ConfigError, did_you_mean
+from silo.bom.message import joined, message
 from silo.bom.numbers import yes_or_no
 from silo.platform import MODES_COUNT, config_folder, replacing
 
@@ -34,9 +35,12 @@ Source = TypeVar("Source", bound=str)
 URL, TOKEN, VERIFY = "SILO_API_URL", "SILO_API_TOKEN", "SILO_SSL_VERIFY"
 
 _KEYS = ("url", "token", "verify")
-_HOW = (
-    "Start one on this computer with `silo-mod serve` (it prints its address and a token), then run "
-    f"`silo-mod login http://127.0.0.1:8080`, set {URL} and {TOKEN}, or give --server and --token"
+_HOW = message(
+    "Start one on this computer with `silo-mod serve` (it prints its address and a token), "
+    "then run `silo-mod login http://127.0.0.1:8080`, set {url} and {token}, or give "
+    "--server and --token",
+    url=URL,
+    token=TOKEN,
 )
 
 
@@ -72,12 +76,19 @@ def resolve_server(
     path = path or config_path(env)
     for option, given in (("--server", server), ("--token", token)):
         if given is not None and not given.strip():
-            raise ConfigError(f"{option} is empty; leave it out, or give a value (a variable may be unset)")
+            raise ConfigError(
+                message(
+                    "{option} is empty; leave it out, or give a value (a variable may be unset)",
+                    option=option,
+                )
+            )
     stored = checked_config(path).get("server", {})
     file_url, file_token = _text(stored, "url", path), _text(stored, "token", path)
     url, url_from = first_of(("--server", server), (URL, env.get(URL)), (str(path), file_url))
     if url is None:
-        raise ConfigError(f"no Silo server is configured. {_HOW}, or write both into {path}")
+        raise ConfigError(
+            message("no Silo server is configured. {how}, or write both into {path}", how=_HOW, path=path)
+        )
     if not same_server(url, file_url):
         file_token = None
     server_url, token_from = first_of(("--token", token), (TOKEN, env.get(TOKEN)), (str(path), file_token))
@@ -100,7 +111,13 @@ def load_config(path: Path) -> dict[str, Any]:
     except FileNotFoundError:
         return {}
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: the configuration cannot be read ({error}); mend or remove it") from error
+        raise ConfigError(
+            message(
+                "{path}: the configuration cannot be read ({error}); mend or remove it",
+                path=path,
+                error=error,
+            )
+        ) from error
 
 
 def save_config(
@@ -129,7 +146,11 @@ def save_config(
             file.write(text.encode())
     except OSError as error:
         raise ConfigError(
-            f"{path}: the configuration cannot be written ({error.strerror or error})"
+            message(
+                "{path}: the configuration cannot be written ({error})",
+                path=path,
+                error=error.strerror or error,
+            )
         ) from error
     return path
 
@@ -142,24 +163,45 @@ def checked_config(path: Path) -> dict[str, Any]:
     problems = []
     for name, value in config.items():
         if name != "server":
-            inside = "; it belongs below [server]" if name in _KEYS else _hint(f"[{name}]", ("[server]",))
-            what = f"unknown table [{name}]" if isinstance(value, dict) else f"unknown key {name}"
-            problems.append(f"line {_line(path, name)}: {what}{inside}")
+            inside = (
+                message("; it belongs below [server]") if name in _KEYS else _hint(f"[{name}]", ("[server]",))
+            )
+            what = (
+                message("unknown table [{name}]", name=name)
+                if isinstance(value, dict)
+                else message("unknown key {name}", name=name)
+            )
+            problems.append(
+                message("line {name}: {what}{inside}", name=_line(path, name), what=what, inside=inside)
+            )
         elif not isinstance(value, dict):
-            problems.append(f"line {_line(path, name)}: wanted a table [server], got {value!r}")
+            problems.append(
+                message(
+                    "line {name}: wanted a table [server], got {value}",
+                    name=_line(path, name),
+                    value=repr(value),
+                )
+            )
         else:
             problems += [
-                f"line {_line(path, key)}: unknown key {key} in [server]{_hint(key, _KEYS)}"
+                message(
+                    "line {key}: unknown key {key1} in [server]{key2}",
+                    key=_line(path, key),
+                    key1=key,
+                    key2=_hint(key, _KEYS),
+                )
                 for key in value
                 if key not in _KEYS
             ]
     if problems:
-        raise ConfigError(f"{path}: {'; '.join(problems)}. Mend or remove it")
+        raise ConfigError(
+            message("{path}: {problems}. Mend or remove it", path=path, problems=joined("; ", problems))
+        )
     return config
 
 
 def _hint(name: str, names: Sequence[str]) -> str:
-    return did_you_mean(name.lower(), names) or f" (known: {', '.join(names)})"
+    return did_you_mean(name.lower(), names) or message(" (known: {names})", names=", ".join(names))
 
 
 def _line(path: Path, name: str) -> int:
@@ -172,7 +214,14 @@ def _line(path: Path, name: str) -> int:
 def _text(table: Mapping[str, Any], key: str, path: Path) -> str | None:
     value = table.get(key)
     if value is not None and not isinstance(value, str):
-        raise ConfigError(f"{path}: server.{key} wants a text in quotes, got {type(value).__name__}")
+        raise ConfigError(
+            message(
+                "{path}: server.{key} wants a text in quotes, got {name}",
+                path=path,
+                key=key,
+                name=type(value).__name__,
+            )
+        )
     return value
 
 
@@ -190,7 +239,11 @@ def first_of(
 
 
 def _verify(option: bool | str | None, variable: str | None, stored: Any, path: Path) -> bool | str:
-    for source, value in (("verify", option), (VERIFY, variable), (f"server.verify in {path}", stored)):
+    for source, value in (
+        ("verify", option),
+        (VERIFY, variable),
+        (message("server.verify in {path}", path=path), stored),
+    ):
         if isinstance(value, bool):
             return value
         if isinstance(value, str) and value.strip():
@@ -204,6 +257,10 @@ def verify_of(source: str, text: str) -> bool | str:
         return checked
     if not Path(text).expanduser().exists():
         raise ConfigError(
-            f"{source}: wanted true, false or a file with certificate authorities; {text} is not a file"
+            message(
+                "{source}: wanted true, false or a file with certificate authorities; {text} is not a file",
+                source=source,
+                text=text,
+            )
         )
     return str(Path(text).expanduser())

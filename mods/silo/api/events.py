@@ -39,6 +39,7 @@ from silo.bom.errors import (
     ServerFaultError,
     SiloError,
 )
+from silo.bom.message import message
 from silo.bom.numbers import whole_number
 
 log = logging.getLogger("silo.api")
@@ -51,20 +52,26 @@ SILENCE = 90.0
 def open_stream(transport: Transport, last_event_id: str | None, silence: float) -> HttpEventStream:
     """Ask for the events after ``last_event_id``; raises as every request does, and PackageError."""
     if importlib.util.find_spec("sseclient") is None:
-        raise PackageError("live events need the Python package sseclient-py, which is not installed")
+        raise PackageError(
+            message("live events need the Python package sseclient-py, which is not installed")
+        )
     headers = {"Accept": "text/event-stream", "Cache-Control": "no-cache", "Accept-Encoding": "identity"}
     if last_event_id:
         headers["Last-Event-ID"] = last_event_id
-    call = ApiCall("GET", transport.address.api("events"), "its events", headers=headers, endless=True)
+    call = ApiCall(
+        "GET", transport.address.api("events"), message("its events"), headers=headers, endless=True
+    )
     response = transport.open(call, read_timeout=silence)
-    where = Where(transport.address.host, "its events", transport.timeouts.connect, silence)
+    where = Where(transport.address.host, message("its events"), transport.timeouts.connect, silence)
     kind = response.headers.get("Content-Type", "")
     if response.status_code != 200 or "text/event-stream" not in kind.lower():
         with closing(response):
             reply = transport.reply(response, replace(call, max_bytes=MAX_ERROR, endless=False))
         if not reply.ok:
             raise error_of(reply)
-        raise ServerFaultError(f"{where.asked} answered no event stream; check that it is a Silo server")
+        raise ServerFaultError(
+            message("{asked} answered no event stream; check that it is a Silo server", asked=where.asked)
+        )
     return HttpEventStream(response, where)
 
 
@@ -158,8 +165,16 @@ class ConnectionState:
     retry_in: float | None = None
 
     def __str__(self) -> str:
-        again = f"; next try in {self.retry_in:.0f} s" if self.retry_in is not None else ""
-        return f"{self.kind}: {self.message}{again}" if self.message else str(self.kind)
+        again = (
+            message("; next try in {retry_in} s", retry_in=f"{self.retry_in:.0f}")
+            if self.retry_in is not None
+            else ""
+        )
+        return (
+            message("{kind}: {message}{again}", kind=self.kind, message=self.message, again=again)
+            if self.message
+            else str(self.kind)
+        )
 
 
 @dataclass
@@ -308,7 +323,7 @@ class EventListener:
             heard, kind, answer = _Heard(), Connection.OFFLINE, None
             try:
                 self._listen(stop, heard)
-                reason = "the server ended the connection"
+                reason: str = message("the server ended the connection")
             except RejectedError as error:
                 # The mark is another server's; without it there is a gap, which a reset reports.
                 reason = str(error)
@@ -404,13 +419,13 @@ class EventListener:
         before, self._last_id = self._last_id, marker
         if _number(marker) < _number(before):
             # The server counts again, so what happened around its restart was never replayed.
-            again = ServerEvent(marker, RESET, {"reason": "the server counts again"})
+            again = ServerEvent(marker, RESET, {"reason": message("the server counts again")})
             self._call(stop, self._on_event, again)
 
     def _forget_mark(self, stop: threading.Event) -> None:
         if self._last_id is not None:
             self._last_id = None
-            gap = ServerEvent(None, RESET, {"reason": "the server does not know where we stopped"})
+            gap = ServerEvent(None, RESET, {"reason": message("the server does not know where we stopped")})
             self._call(stop, self._on_event, gap)
 
     def _tell(self, stop: threading.Event, state: ConnectionState) -> None:

@@ -29,6 +29,7 @@ from silo.api.wire import (
     Wire,
 )
 from silo.bom.errors import ConflictError, DocumentError, RejectedError, RouteMissingError, ServerFaultError
+from silo.bom.message import message
 from silo.bom.numbers import whole_number
 from silo.bom.text import with_allowed_characters
 from silo.file_kind import MODEL
@@ -56,9 +57,15 @@ def download_revision(
     if checksum and result != checksum:
         remove_patiently(path)
         raise ServerFaultError(
-            f"the file of {part_number}, revision {revision}, is not the one that was committed: its SHA-256 "
-            f"is {result[:12]}…, wanted {checksum[:12]}…. Nothing was written; the server's administrator "
-            "can check its files"
+            message(
+                "the file of {part_number}, revision {revision}, is not the one that was committed: its "
+                "SHA-256 is {result}…, wanted {checksum}…. Nothing was written; the server's "
+                "administrator can check its files",
+                part_number=part_number,
+                revision=revision,
+                result=result[:12],
+                checksum=checksum[:12],
+            )
         )
     return result
 
@@ -104,7 +111,7 @@ class FileCalls(Caller):
         """
         wanted, lacking = sorted(set(sha256)), set[str]()
         for at in range(0, len(wanted), _PAGE):
-            reply = self._ask("the models", "models", "missing", sha256=wanted[at : at + _PAGE])
+            reply = self._ask(message("the models"), "models", "missing", sha256=wanted[at : at + _PAGE])
             lacking.update(reply.model(MissingModels).sha256)
         return lacking & set(wanted)
 
@@ -114,7 +121,12 @@ class FileCalls(Caller):
         headers = {"Accept": "application/json", "Content-Type": kind, "Content-Encoding": "gzip"}
         url = self._address.api("models", sha256, part)
         call = ApiCall(
-            "PUT", url, f"the {part} of a file", body=lambda: body, headers=headers, repeatable=True
+            "PUT",
+            url,
+            message("the {part} of a file", part=part),
+            body=lambda: body,
+            headers=headers,
+            repeatable=True,
         )
         self._transport.send(call)
 
@@ -124,12 +136,12 @@ class FileCalls(Caller):
         Raises RouteMissingError if the server keeps no models.
         """
         asked: Params = {"revision": revision}
-        subject = f"the model of {part_number}"
+        subject = message("the model of {part_number}", part_number=part_number)
         return self._get(subject, *_path_of(part_number), "scene", params=asked).model(Scene)
 
     def get_geometry(self, sha256: str, /) -> bytes:
         """Return the model (GLB) of a file's content."""
-        body = self._get("the geometry of a file", "models", sha256, "geometry").content
+        body = self._get(message("the geometry of a file"), "models", sha256, "geometry").content
         return gzip.decompress(body) if body.startswith(b"\x1f\x8b") else body
 
     def get_documents(self, uuids: Iterable[str], /) -> dict[str, Document]:
@@ -141,7 +153,7 @@ class FileCalls(Caller):
         documents: dict[str, Document] = {}
         wanted = sorted({uuid.lower() for uuid in uuids if uuid})
         for at in range(0, len(wanted), _PAGE):
-            reply = self._ask("the files", "documents", "by-uuid", uuids=wanted[at : at + _PAGE])
+            reply = self._ask(message("the files"), "documents", "by-uuid", uuids=wanted[at : at + _PAGE])
             documents |= {model.id: model for model in reply.models(Document, "documents", *LISTS)}
         return documents
 
@@ -152,17 +164,22 @@ class FileCalls(Caller):
         """
         wanted, found = sorted(set(sha256)), list[KnownContent]()
         for at in range(0, len(wanted), _PAGE):
-            reply = self._ask("the files", "documents", "by-content", sha256=wanted[at : at + _PAGE])
+            reply = self._ask(message("the files"), "documents", "by-content", sha256=wanted[at : at + _PAGE])
             found += reply.models(KnownContent, "contents", *LISTS)
         return found
 
     def get_document(self, uuid: str, /) -> Document:
         """Return a document, with the documents that it links to and those that link to it."""
-        return self._get(f"the document {uuid}", "documents", uuid).model(Document)
+        return self._get(message("the document {uuid}", uuid=uuid), "documents", uuid).model(Document)
 
     def documents_of(self, part_number: str, /) -> list[Document]:
         """Return the documents that hold an item; its own comes first."""
-        where = (f"the files of {part_number}", "items", part_number, "documents")
+        where = (
+            message("the files of {part_number}", part_number=part_number),
+            "items",
+            part_number,
+            "documents",
+        )
         return [document for page, _ in self._all(Document, *where, keys=("documents",)) for document in page]
 
     def get_release(self, part_number: str, label: str, /) -> Release:
@@ -171,7 +188,7 @@ class FileCalls(Caller):
 
         Raises NotFoundError, RouteMissingError if the server knows no releases.
         """
-        subject = f"revision {label} of {part_number}"
+        subject = message("revision {label} of {part_number}", label=label, part_number=part_number)
         return self._get(subject, "items", part_number, "releases", label).model(Release)
 
     def revisions(self, part_number: str, /, *, newest: int | None = None, after: int = 0) -> list[Revision]:
@@ -183,7 +200,7 @@ class FileCalls(Caller):
         def read(limit: int) -> Iterator[tuple[list[Revision], int]]:
             more = {"after": after} if after else {}
             where = (*_path_of(part_number), "revisions")
-            subject = f"the revisions of {part_number}"
+            subject = message("the revisions of {part_number}", part_number=part_number)
             return self._all(Revision, subject, *where, keys=("revisions",), limit=limit, **more)
 
         pages = read(newest or _PAGE)
@@ -201,7 +218,7 @@ class FileCalls(Caller):
 
     def get_revision(self, part_number: str, number: int, /) -> Revision:
         """Return a revision, with the files that its file links to."""
-        subject = f"revision {number} of {part_number}"
+        subject = message("revision {number} of {part_number}", number=number, part_number=part_number)
         return self._get(subject, *_path_of(part_number), "revisions", str(number)).model(Revision)
 
     def upload_file(
@@ -228,7 +245,7 @@ class FileCalls(Caller):
         """
         path = Path(path)
         name = file_name or path.name
-        subject = f"{name} for {part_number}"
+        subject = message("{name} for {part_number}", name=name, part_number=part_number)
         fields = _upload_fields(comment, properties, sha256, origin)
         with closing(FileForm(path, fields, name, on_progress, cancelled)) as form:
             headers = {"Content-Type": form.content_type, "Accept": "application/json"}
@@ -248,8 +265,13 @@ class FileCalls(Caller):
         if (checksum_of(revision) or sent) != sent:
             # Sending it again automatically would make a revision each time.
             raise ConflictError(
-                f"{self._address.host} stored other content than was sent for {subject} "
-                f"(revision {revision.revision_number}); look at that revision, then send the file again"
+                message(
+                    "{host} stored other content than was sent for {subject} (revision {revision_number}); "
+                    "look at that revision, then send the file again",
+                    host=self._address.host,
+                    subject=subject,
+                    revision_number=revision.revision_number,
+                )
             )
         return revision
 
@@ -258,7 +280,12 @@ class FileCalls(Caller):
 
         Raises RouteMissingError if the server lists none.
         """
-        where = (f"the attachments of {part_number}", "items", part_number, "files")
+        where = (
+            message("the attachments of {part_number}", part_number=part_number),
+            "items",
+            part_number,
+            "files",
+        )
         return [
             attachment for page, _ in self._all(Attachment, *where, keys=("files",)) for attachment in page
         ]
@@ -280,7 +307,9 @@ class FileCalls(Caller):
         with closing(FileForm(Path(path), fields, file_name, None, cancelled)) as form:
             headers = {"Content-Type": form.content_type, "Accept": "application/json"}
             url = self._address.api("items", part_number, "files")
-            subject = f"{file_name} beside {part_number}"
+            subject = message(
+                "{file_name} beside {part_number}", file_name=file_name, part_number=part_number
+            )
             self._transport.send(
                 ApiCall("POST", url, subject, body=form.rewound, headers=headers, cancelled=cancelled)
             )
@@ -304,7 +333,7 @@ class FileCalls(Caller):
         call = ApiCall(
             "GET",
             self._address.api(*segments),
-            f"the file of {part_number}",
+            message("the file of {part_number}", part_number=part_number),
             headers={"Accept-Encoding": "identity"},
             max_bytes=MAX_DOWNLOAD,
             endless=True,
@@ -373,7 +402,9 @@ def _in_two_steps(
     ).mapping()
     key, url = place.get("object_key"), place.get("upload_url")
     if not isinstance(key, str) or not isinstance(url, str):
-        raise ServerFaultError(f"{call.subject}: the server names no place to upload the file to")
+        raise ServerFaultError(
+            message("{subject}: the server names no place to upload the file to", subject=call.subject)
+        )
     with closing(FileBody(path, on_progress, call.cancelled)) as content:
         put = replace(
             call,
@@ -400,5 +431,7 @@ def _write(path: Path, pieces: Iterator[bytes], total: int, on_progress: Progres
                 if on_progress is not None:
                     on_progress(done, max(total, done))
     except OSError as error:
-        raise DocumentError(str(path), f"cannot be written ({error.strerror or error})") from error
+        raise DocumentError(
+            str(path), message("cannot be written ({error})", error=error.strerror or error)
+        ) from error
     return digest.hexdigest()

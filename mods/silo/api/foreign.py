@@ -27,6 +27,7 @@ from silo.bom.errors import (
     SiloError,
     UnreachableError,
 )
+from silo.bom.message import Message, message, template
 
 FOREIGN: tuple[type[Exception], ...] = (
     rq.RequestException,
@@ -52,50 +53,62 @@ class Where:
     @property
     def asked(self) -> str:
         """Return ``host``, or with the subject ``host (the BOM of ASM-001)``."""
-        return f"{self.host} ({self.subject})" if self.subject else self.host
+        if not self.subject:
+            return self.host
+        return message("{host} ({subject})", host=self.host, subject=self.subject)
 
 
 _Kind = tuple[type[SiloError], str]
 
 _REFUSED: _Kind = (
     NotSentError,
-    "nothing answers at {host}: is the Silo server running, and is the address right? "
-    "`silo-mod serve` starts one on this computer",
+    template(
+        "nothing answers at {host}: is the Silo server running, and is the address right? "
+        "`silo-mod serve` starts one on this computer"
+    ),
 )
 _UNKNOWN_NAME: _Kind = (
     NotSentError,
-    "the name in {host} is not known here: check the address, the network or the VPN",
+    template("the name in {host} is not known here: check the address, the network or the VPN"),
 )
 _SLOW_CONNECT: _Kind = (
     NotSentError,
-    "{host} could not be reached within {connect:g} s: check the network or the VPN",
+    template("{host} could not be reached within {connect} s: check the network or the VPN"),
 )
 _SLOW_ANSWER: _Kind = (
     UnreachableError,
-    "{asked} was silent for {read:g} s; try again, or allow a longer time",
+    template("{asked} was silent for {read} s; try again, or allow a longer time"),
 )
 _BROKEN: _Kind = (
     UnreachableError,
-    "{asked} closed the connection before the answer was complete; try again",
+    template("{asked} closed the connection before the answer was complete; try again"),
 )
 _TLS: _Kind = (
     NotSentError,
-    "no secure connection to {host}: its certificate is not trusted here, or it speaks no https. "
-    "For an own certificate authority give its file in SILO_SSL_VERIFY",
+    template(
+        "no secure connection to {host}: its certificate is not trusted here, or it speaks no https. "
+        "For an own certificate authority give its file in SILO_SSL_VERIFY"
+    ),
 )
-_PROXY: _Kind = (NotSentError, "the proxy on the way to {host} does not let us through; check its settings")
+_PROXY: _Kind = (
+    NotSentError,
+    template("the proxy on the way to {host} does not let us through; check its settings"),
+)
 _ADDRESS: _Kind = (
     ConfigError,
-    "{host}: this server address cannot be used; write it like https://silo.example.com",
+    template("{host}: this server address cannot be used; write it like https://silo.example.com"),
 )
 # The library's own text quotes the header's value, which may be the token.
-_HEADER: _Kind = (ConfigError, "{host}: the token or a header holds characters that HTTP does not allow")
-_LOOP: _Kind = (ServerFaultError, "{asked} redirects in a circle; check the server address")
+_HEADER: _Kind = (
+    ConfigError,
+    template("{host}: the token or a header holds characters that HTTP does not allow"),
+)
+_LOOP: _Kind = (ServerFaultError, template("{asked} redirects in a circle; check the server address"))
 _GARBLED: _Kind = (
     ServerFaultError,
-    "{asked} answered something that cannot be understood; is this the address of a Silo server?",
+    template("{asked} answered something that cannot be understood; is this the address of a Silo server?"),
 )
-_OURS: _Kind = (InputError, "{asked}: what was to be sent cannot be put into a request")
+_OURS: _Kind = (InputError, template("{asked}: what was to be sent cannot be put into a request"))
 
 _REQUESTS: tuple[tuple[_Kind, str], ...] = (
     (_BROKEN, "RequestException ConnectionError ChunkedEncodingError RetryError"),
@@ -156,7 +169,8 @@ def translate(error: Exception, where: Where) -> SiloError:
     """Turn an error of another library into one of ours, in plain words. It never quotes a header."""
     exception = _innermost(error)
     kind, text = next((TABLE[cause] for cause in type(exception).__mro__ if cause in TABLE), _GARBLED)
-    return kind(text.format(host=where.host, asked=where.asked, connect=where.connect, read=where.read))
+    limits = {"connect": f"{where.connect:g}", "read": f"{where.read:g}"}
+    return kind(Message(text, {"host": where.host, "asked": where.asked, **limits}))
 
 
 @contextmanager

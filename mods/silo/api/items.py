@@ -24,6 +24,7 @@ from silo.bom.errors import (
     SiloError,
 )
 from silo.bom.items.schema import Categories, categories_of, rules_of, schema_names
+from silo.bom.message import message
 from silo.bom.text import name_key
 from silo.bom.walk.identity import as_uuid
 from silo.checksums import bare_checksum
@@ -90,7 +91,7 @@ class ItemCalls(FileCalls):
         if not uuid.strip(". ") or any(c in "/\\?#%" or c < " " for c in uuid):
             return None
         try:
-            item = self._get(f"item {uuid}", "items", "by-uuid", uuid).model(Item)
+            item = self._get(message("item {uuid}", uuid=uuid), "items", "by-uuid", uuid).model(Item)
         except WebPageError:
             if self._speaks_silo():
                 return None
@@ -101,7 +102,9 @@ class ItemCalls(FileCalls):
         except (NotFoundError, RejectedError):
             return None
         if _written(item.id) != _written(uuid):
-            raise ServerFaultError(f"item {uuid}: the server answered with the item {item.id}")
+            raise ServerFaultError(
+                message("item {uuid}: the server answered with the item {id}", uuid=uuid, id=item.id)
+            )
         return item
 
     def get_items_by_uuid(
@@ -115,15 +118,21 @@ class ItemCalls(FileCalls):
         """
 
         def batch(some: Sequence[str]) -> dict[str, Item]:
-            where = (f"{len(some)} items", "items", "by-uuid")
+            where = (message("{count} items", count=len(some)), "items", "by-uuid")
             reply = self._ask(*where, uuids=list(some), cancelled=cancelled)
             if reply.is_null(*LISTS):
                 # Go's empty list, or no answer. As "not registered", it would make people register again.
-                raise RejectedError(f"{len(some)} items: the answer is null")
+                raise RejectedError(message("{count} items: the answer is null", count=len(some)))
             models = {_written(item.id): item for item in reply.models(Item, *LISTS)}
             if reply.next or reply.total > len(models):
                 # Taken as "not registered", the items of the other pages would be made once more.
-                raise RejectedError(f"{len(some)} items: the answer has {len(models)}, and is not the whole")
+                raise RejectedError(
+                    message(
+                        "{count} items: the answer has {count1}, and is not the whole",
+                        count=len(some),
+                        count1=len(models),
+                    )
+                )
             return {uuid: models[_written(uuid)] for uuid in some if _written(uuid) in models}
 
         wanted = [uuid for uuid in uuids if uuid]
@@ -132,7 +141,7 @@ class ItemCalls(FileCalls):
     def _speaks_silo(self) -> bool:
         if self._is_silo is None:
             try:
-                self._get("its items", "items", params={"limit": 1}).models(Item, *LISTS)
+                self._get(message("its items"), "items", params={"limit": 1}).models(Item, *LISTS)
                 self._is_silo = True
             except SiloError:
                 self._is_silo = False
@@ -140,12 +149,19 @@ class ItemCalls(FileCalls):
 
     def get_item(self, part_number: str, /) -> Item:
         """Return the item with this part number; raises :class:`NotFoundError` if there is none."""
-        return self._get(f"item {part_number}", "items", part_number).model(Item)
+        return self._get(message("item {part_number}", part_number=part_number), "items", part_number).model(
+            Item
+        )
 
     def thumbnail(self, part_number: str, /) -> bytes | None:
         """Return the picture of an item as PNG; None if the item has none or the server keeps none."""
         try:
-            return self._get(f"the picture of {part_number}", "items", part_number, "thumbnail").content
+            return self._get(
+                message("the picture of {part_number}", part_number=part_number),
+                "items",
+                part_number,
+                "thumbnail",
+            ).content
         except (NotFoundError, RejectedError, ServerFaultError):
             return None
 
@@ -159,13 +175,15 @@ class ItemCalls(FileCalls):
         if query and not item_type and not offset:
             try:
                 asked: Params = {"q": query, "limit": limit}
-                reply = self._get(f"items like {query!r}", "items", "search", params=asked)
+                reply = self._get(
+                    message("items like {query}", query=repr(query)), "items", "search", params=asked
+                )
                 return reply.models(Item, *LISTS)
             except NotFoundError:
                 pass  # A server without the fuzzy search may still filter its list.
         if query:
             params["search"] = query
-        return self._get("its items", "items", params=params).models(Item, *LISTS)
+        return self._get(message("its items"), "items", params=params).models(Item, *LISTS)
 
     def create_item(
         self,
@@ -203,9 +221,9 @@ class ItemCalls(FileCalls):
         headers = {"Idempotency-Key": idempotency_key} if idempotency_key else {}
         reply = self._change(
             "POST",
-            "a new item",
+            message("a new item"),
             "items",
-            body=body(ItemBody, values, "an item"),
+            body=body(ItemBody, values, message("an item")),
             headers=headers,
             extensions=("id", "name"),
         )
@@ -244,12 +262,16 @@ class ItemCalls(FileCalls):
         number = newest.revision_number if newest is not None else item.current_revision
         if newest is not None and "properties" in newest.model_fields_set:
             return dict(newest.properties)
-        subject = f"revision {number} of {part_number}"
+        subject = message("revision {number} of {part_number}", number=number, part_number=part_number)
         asked = self._get(subject, "items", part_number, "revisions", str(number)).mapping()
         if "properties" not in asked or not isinstance(asked["properties"], dict | None):
             raise ServerFaultError(
-                f"{self._address.host} does not show the properties of {part_number}; nothing was written: "
-                "it would replace properties that are not known here"
+                message(
+                    "{host} does not show the properties of {part_number}; nothing was written: it would "
+                    "replace properties that are not known here",
+                    host=self._address.host,
+                    part_number=part_number,
+                )
             )
         return dict(asked["properties"] or {})
 
@@ -258,9 +280,9 @@ class ItemCalls(FileCalls):
 
         ``properties`` makes a new revision (with ``comment``); the rest changes in place.
         """
-        content = body(ItemChanges, changes, "an item")
+        content = body(ItemChanges, changes, message("an item"))
         extensions = ("source",) if content.source else ()
-        subject = f"item {part_number}"
+        subject = message("item {part_number}", part_number=part_number)
         reply = self._change("PUT", subject, "items", part_number, body=content, extensions=extensions)
         # Some servers answer a change with no content.
         if not reply.content.strip():
@@ -269,17 +291,19 @@ class ItemCalls(FileCalls):
 
     def archive_item(self, part_number: str, /) -> None:
         """Archive an item; the server keeps it, and everything that refers to it."""
-        self._delete(f"item {part_number}", "items", part_number)
+        self._delete(message("item {part_number}", part_number=part_number), "items", part_number)
 
     def generate_part_number(self, schema: str, category: str) -> str:
         """Return the number that the next item of this category would get. Reserves nothing."""
         wanted = {"schema": schema, "category": category}
-        reply = self._change("POST", f"a number in {category}", "generate-part-number", body=wanted)
+        reply = self._change(
+            "POST", message("a number in {category}", category=category), "generate-part-number", body=wanted
+        )
         return reply.model(NumberAnswer).part_number
 
     def get_schema(self, name: str = "kindred-rd") -> dict[str, Any]:
         """Return the part-number schema as the server describes it."""
-        return self._get(f"schema {name}", "schemas", name).mapping()
+        return self._get(message("schema {name}", name=name), "schemas", name).mapping()
 
     def find_schema(self, wanted: str = USUAL_SCHEMA) -> str:
         """Find the name of the part-number schema to use: the wanted one; for the usual one, which is not
@@ -301,7 +325,7 @@ class ItemCalls(FileCalls):
 
     def _only_schema(self, wanted: str, missing: NotFoundError) -> str:
         try:
-            data = self._get("its schemas", "schemas").data()
+            data = self._get(message("its schemas"), "schemas").data()
         except NotFoundError:
             raise missing from None
         names = schema_names(data)
@@ -309,10 +333,19 @@ class ItemCalls(FileCalls):
             return names[0]
         host = self._address.host
         if not names:
-            raise InputError(f"{host} has no part-number schema {wanted}, and lists no other") from missing
+            raise InputError(
+                message(
+                    "{host} has no part-number schema {wanted}, and lists no other", host=host, wanted=wanted
+                )
+            ) from missing
         raise InputError(
-            f"{host} has no part-number schema {wanted}; it has {', '.join(names)}. Choose one of them with "
-            "--schema, or in the Silo preferences"
+            message(
+                "{host} has no part-number schema {wanted}; it has {names}. Choose one of them with "
+                "--schema, or in the Silo preferences",
+                host=host,
+                wanted=wanted,
+                names=", ".join(names),
+            )
         ) from missing
 
     def categories(self, name: str = "kindred-rd") -> Categories:
@@ -333,11 +366,17 @@ class ItemCalls(FileCalls):
 
         def batch(some: Sequence[tuple[str, str]]) -> dict[tuple[str, str], list[LookAlike]]:
             asked = [{"name": name, "sha256": digest} for name, digest in some]
-            where = (f"items like {len(some)} components", "items", "look-alikes")
+            where = (message("items like {count} components", count=len(some)), "items", "look-alikes")
             reply = self._ask(*where, wanted=asked, cancelled=cancelled)
             answer = reply.model(LookAlikesAnswer).look_alikes
             if len(answer) != len(some):
-                raise ServerFaultError(f"wanted {len(some)} lists of look-alikes, got {len(answer)}")
+                raise ServerFaultError(
+                    message(
+                        "wanted {count} lists of look-alikes, got {count1}",
+                        count=len(some),
+                        count1=len(answer),
+                    )
+                )
             return dict(zip(some, answer, strict=True))
 
         return self._many("look_alikes", wanted, batch, self._look_alikes, cancelled)

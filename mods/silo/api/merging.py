@@ -40,6 +40,7 @@ from silo.bom.errors import (
     SiloError,
     listed,
 )
+from silo.bom.message import joined, message
 from silo.bom.quantities import same_quantity
 from silo.bom.units import says_the_same
 
@@ -77,8 +78,12 @@ def merge_result(reply: Reply) -> MergeResult | None:
     word = str(data.get("status") or "").casefold()
     if data.get("error") or data.get("success") is False or data.get("ok") is False or word in _FAILED:
         raise ServerFaultError(
-            f"{reply.where.asked}: the server answered {reply.status} but reports a failure"
-            f"{': ' + failure.text if failure.text else ''}"
+            message(
+                "{asked}: the server answered {status} but reports a failure{text}",
+                asked=reply.where.asked,
+                status=reply.status,
+                text=": " + failure.text if failure.text else "",
+            )
         )
     diff = data.get("diff")
     if not isinstance(diff, dict) or not _LISTS.intersection(diff) or (word and word not in _DONE):
@@ -104,24 +109,34 @@ def read_back(api: BomCalls, part_number: str, request: MergeRequest, host: str)
     """Read the BOM again after a merge whose answer says neither success nor failure, and make the result
     from it. Raises :class:`ServerFaultError` if the BOM does not show the merge.
     """
-    sent = f"{host}: the BOM of {part_number} was sent, but the answer was not understood"
+    sent = message(
+        "{host}: the BOM of {part_number} was sent, but the answer was not understood",
+        host=host,
+        part_number=part_number,
+    )
     if request.dry_run:
-        raise ServerFaultError(f"{sent}; nothing was to be changed")
+        raise ServerFaultError(message("{sent}; nothing was to be changed", sent=sent))
     try:
         lines = {line.child_part_number.casefold(): line for line in api.get_bom(part_number)}
     except SiloError as error:
-        raise ServerFaultError(f"{sent}, and the BOM cannot be read back ({error})") from error
+        raise ServerFaultError(
+            message("{sent}, and the BOM cannot be read back ({error})", sent=sent, error=error)
+        ) from error
     wrong = [entry for entry in request.entries if not _shows(lines.get(_key(entry)), entry)]
     if wrong:
         names = listed([entry.child_part_number for entry in wrong])
-        raise ServerFaultError(f"{sent}, and its BOM does not show {names} as in the assembly")
+        raise ServerFaultError(
+            message("{sent}, and its BOM does not show {names} as in the assembly", sent=sent, names=names)
+        )
     lines_of = [lines[_key(entry)] for entry in request.entries]
     shown = [QuantityLine(part_number=line.child_part_number, quantity=line.quantity) for line in lines_of]
     return MergeResult(
         diff=MergeDiff(unchanged=shown),
         warnings=[
             MergeWarning(
-                type=UNCLEAR, part_number=part_number, message=f"{sent}; the BOM shows all of its lines"
+                type=UNCLEAR,
+                part_number=part_number,
+                message=message("{sent}; the BOM shows all of its lines", sent=sent),
             )
         ],
         sync_id=request.sync_id,
@@ -182,11 +197,22 @@ def merge_by_lines(
     written = len(plan.diff.added) + len(plan.diff.quantity_changed) - len(refused)
     if refused:
         raise RejectedError(
-            f"{host} has no merge; of the BOM of {part_number}, {written} lines were written one by one and "
-            f"{len(refused)} were refused: {'; '.join(refused[:5])}",
+            message(
+                "{host} has no merge; of the BOM of {part_number}, {written} lines were written one by "
+                "one and {count} were refused: {refused}",
+                host=host,
+                part_number=part_number,
+                written=written,
+                count=len(refused),
+                refused=joined("; ", refused[:5]),
+            ),
             refused,
         )
-    text = f"{host} has no merge: {written} lines were written one by one, not in one step"
+    text = message(
+        "{host} has no merge: {written} lines were written one by one, not in one step",
+        host=host,
+        written=written,
+    )
     warning = MergeWarning(type=NOT_ATOMIC, part_number=part_number, message=text)
     return result.model_copy(update={"warnings": [*result.warnings, warning]} if written else {})
 
@@ -200,7 +226,7 @@ def _try(refused: list[str], child: str, call: Callable[[], object]) -> None:
     except (CycleError, RouteMissingError):
         raise
     except (RejectedError, NotFoundError, ConflictError) as error:
-        refused.append(f"{child}: {error}")
+        refused.append(message("{child}: {error}", child=child, error=error))
 
 
 def _key(entry: MergeEntry) -> str:

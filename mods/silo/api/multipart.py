@@ -12,6 +12,7 @@ from typing import BinaryIO, Self
 
 from silo.api.transport import Cancel, stop_if
 from silo.bom.errors import DocumentError
+from silo.bom.message import message
 
 _BLOCK = 1 << 18
 
@@ -110,7 +111,7 @@ class FileForm:
             raise _unreadable(self._path, error) from error
         if not block:
             raise DocumentError(
-                str(self._path), "the file became shorter while it was sent; save it, then try again"
+                str(self._path), message("the file became shorter while it was sent; save it, then try again")
             )
         self._hash.update(block)
         self._left -= len(block)
@@ -130,4 +131,7 @@ class FileBody(FileForm):
 
 
 def _unreadable(path: Path, error: OSError) -> DocumentError:
-    return DocumentError(str(path), f"the file cannot be read ({error.strerror or error}); nothing was sent")
+    return DocumentError(
+        str(path),
+        message("the file cannot be read ({error}); nothing was sent", error=error.strerror or error),
+    )

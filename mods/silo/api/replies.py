@@ -39,6 +39,7 @@ from silo.bom.errors import (
     VersionConflictError,
     duration,
 )
+from silo.bom.message import joined, message
 from silo.bom.numbers import whole_number
 from silo.bounded_json import read_json
 from silo.budget import Budget, OverBudgetError
@@ -103,8 +104,12 @@ class Reply:
         """Read the JSON of a good answer. Raises :class:`ServerFaultError` if it is none."""
         if self.is_html:
             raise ServerFaultError(
-                f"{self.where.asked} answered with a web page instead of data{_titled(self)}; "
-                "check that the address is that of a Silo server"
+                message(
+                    "{asked} answered with a web page instead of data{titled}; check that the address is "
+                    "that of a Silo server",
+                    asked=self.where.asked,
+                    titled=_titled(self),
+                )
             )
         with translated(self.where):
             try:
@@ -120,7 +125,9 @@ class Reply:
             raise error_of(self)
         data = self.data()
         if not isinstance(data, dict):
-            raise ServerFaultError(f"{self.where.asked} answered no object where one was wanted")
+            raise ServerFaultError(
+                message("{asked} answered no object where one was wanted", asked=self.where.asked)
+            )
         return data
 
     def version(self) -> str | None:
@@ -148,7 +155,11 @@ class Reply:
             models_read = []  # Go's empty list
         if not isinstance(models_read, list):
             raise ServerFaultError(
-                f"{self.where.asked} answered no list where one was wanted ({', '.join(keys)})"
+                message(
+                    "{asked} answered no list where one was wanted ({keys})",
+                    asked=self.where.asked,
+                    keys=", ".join(keys),
+                )
             )
         with translated(self.where):
             return TypeAdapter(list[kind]).validate_python(models_read)  # type: ignore[valid-type]
@@ -192,29 +203,54 @@ def complaint(reply: Reply) -> Complaint:
 def error_of(reply: Reply, *, writing: bool = False) -> SiloError:
     """Return the error that a bad status means. A 503 while ``writing`` can mean a read-only server."""
     reported = complaint(reply)
-    detail = f": {reported.text}" if reported.text else ""
+    detail = message(": {text}", text=reported.text) if reported.text else ""
     asked, host, status = reply.where.asked, reply.where.host, reply.status
     if status == 401 and not reply.secret:
         login = proposed("login", reply.where.host)
         return AuthError(
-            f"{host} wants a token, and none was given. {login} asks for one and keeps it; "
-            "SILO_API_TOKEN or the settings name one too"
+            message(
+                "{host} wants a token, and none was given. {login} asks for one and keeps it; "
+                "SILO_API_TOKEN or the settings name one too",
+                host=host,
+                login=login,
+            )
         )
     if status == 401:
         return AuthError(
-            f"{host} does not accept the token{detail}. Give a valid one (SILO_API_TOKEN, or the settings; "
-            "`silo-mod doctor` shows which one is used)"
+            message(
+                "{host} does not accept the token{detail}. Give a valid one (SILO_API_TOKEN, or the "
+                "settings; `silo-mod doctor` shows which one is used)",
+                host=host,
+                detail=detail,
+            )
         )
     if status == 403:
-        return ForbiddenError(f"{asked}: this token may not do that{detail}. Ask for the editor role")
+        return ForbiddenError(
+            message(
+                "{asked}: this token may not do that{detail}. Ask for the editor role",
+                asked=asked,
+                detail=detail,
+            )
+        )
     if status == 404 and reply.is_html:
         return WebPageError(
-            f"{asked}: not found, says a web page{detail}; is this the address of a Silo server?"
+            message(
+                "{asked}: not found, says a web page{detail}; is this the address of a Silo server?",
+                asked=asked,
+                detail=detail,
+            )
         )
     if status in (405, 501) or (status == 404 and _router_speaks(reported)):
-        return RouteMissingError(f"{asked}: this server does not know the request ({status}){detail}")
+        return RouteMissingError(
+            message(
+                "{asked}: this server does not know the request ({status}){detail}",
+                asked=asked,
+                status=status,
+                detail=detail,
+            )
+        )
     if status in (404, 410):
-        return NotFoundError(f"{asked}: not found{detail}")
+        return NotFoundError(message("{asked}: not found{detail}", asked=asked, detail=detail))
     if status == 409:
         if reported.code == NewerRevisionError.code and reported.revision is not None:
             return NewerRevisionError(f"{asked}{detail}", reported.revision)
@@ -224,30 +260,65 @@ def error_of(reply: Reply, *, writing: bool = False) -> SiloError:
         return (
             CycleError(reported.path)
             if cycle
-            else ConflictError(f"{asked}: in conflict with the present data{detail}")
+            else ConflictError(
+                message("{asked}: in conflict with the present data{detail}", asked=asked, detail=detail)
+            )
         )
     if status == 412:
         return VersionConflictError(
-            f"{asked}: somebody changed it meanwhile{detail}. Read it again, then repeat"
+            message(
+                "{asked}: somebody changed it meanwhile{detail}. Read it again, then repeat",
+                asked=asked,
+                detail=detail,
+            )
         )
     later = retry_after(reply) if status in _LATER else None
     if status == 503 and writing and not reply.is_html and _read_only(reported, later):
-        closed = ReadOnlyError(f"{host} takes no changes now{detail}. Nothing is lost; it can be sent later")
+        closed = ReadOnlyError(
+            message(
+                "{host} takes no changes now{detail}. Nothing is lost; it can be sent later",
+                host=host,
+                detail=detail,
+            )
+        )
         closed.named = _names_read_only(reported)
         return _put_off(closed, later)
     if status == 429 or (status == 503 and later is not None):
-        when = f"in {duration(later)}" if later is not None else "later"
-        return _put_off(BusyError(f"{host} is busy ({status}){detail}. Try again {when}"), later)
+        when = message("in {later}", later=duration(later)) if later is not None else "later"
+        return _put_off(
+            BusyError(
+                message(
+                    "{host} is busy ({status}){detail}. Try again {when}",
+                    host=host,
+                    status=status,
+                    detail=detail,
+                    when=when,
+                )
+            ),
+            later,
+        )
     if status in _LATER:
-        gone = UnreachableError(f"{host} cannot answer now ({status}){detail}. Try again later")
+        gone = UnreachableError(
+            message(
+                "{host} cannot answer now ({status}){detail}. Try again later",
+                host=host,
+                status=status,
+                detail=detail,
+            )
+        )
         gone.refused = status == 503
         return _put_off(gone, later)
     if 400 <= status < 500:
-        what = "; ".join(reported.problems[:10]) or reported.text or "no reason given"
-        rejected = RejectedError(f"{asked}: not accepted ({status}): {what}", reported.problems)
+        what = joined("; ", reported.problems[:10]) or reported.text or message("no reason given")
+        rejected = RejectedError(
+            message("{asked}: not accepted ({status}): {what}", asked=asked, status=status, what=what),
+            reported.problems,
+        )
         rejected.status = status
         return rejected
-    return ServerFaultError(f"{asked}: the server failed ({status}){detail}")
+    return ServerFaultError(
+        message("{asked}: the server failed ({status}){detail}", asked=asked, status=status, detail=detail)
+    )
 
 
 def retry_after(reply: Reply) -> float | None:
@@ -286,7 +357,7 @@ def _under(data: Any, keys: Sequence[str]) -> Any:
 
 def _titled(reply: Reply) -> str:
     match = _TITLE.search(reply.content[:20_000].decode("utf-8", "replace"))
-    return f" ({_clean(html.unescape(match[1]), reply.secret)})" if match else ""
+    return message(" ({secret})", secret=_clean(html.unescape(match[1]), reply.secret)) if match else ""
 
 
 def _texts(value: Any, reply: Reply) -> tuple[str, ...]:
@@ -298,7 +369,7 @@ def _texts(value: Any, reply: Reply) -> tuple[str, ...]:
 def _problem(entry: Any) -> Any:
     if isinstance(entry, dict) and "msg" in entry:  # pydantic's form, as FastAPI sends it
         place = ".".join(str(part) for part in entry.get("loc", ()) if part != "body")
-        return f"{place}: {entry['msg']}" if place else entry["msg"]
+        return message("{place}: {entry}", place=place, entry=entry["msg"]) if place else entry["msg"]
     return entry
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from silo.api.wire import Revision
 from silo.bom.errors import NewerRevisionError
+from silo.bom.message import message
 from silo.checksums import bare_checksum, seen_as
 from silo.file_kind import MODEL, kind_by_name
 from silo.platform import no_device_name
@@ -44,13 +45,21 @@ class Standing:
         if (newest := self.newer) is None:
             return
         made = (
-            f"revision {self.base_number}" if self.base is not None else "a file that is no revision in Silo"
+            message("revision {base_number}", base_number=self.base_number)
+            if self.base is not None
+            else message("a file that is no revision in Silo")
         )
         raise NewerRevisionError(
-            f"{newest.created_by or 'Somebody'} committed revision {newest.revision_number} of {part_number}"
-            f"{f' ({newest.comment})' if newest.comment else ''}, and this was made from {made}. "
-            "Sending it would undo that. Look at theirs; then send yours on top of it, or discard it and "
-            "take theirs",
+            message(
+                "{created_by} committed revision {revision_number} of {part_number}{f}, and this was "
+                "made from {made}. Sending it would undo that. Look at theirs; then send yours on top of "
+                "it, or discard it and take theirs",
+                created_by=newest.created_by or "Somebody",
+                revision_number=newest.revision_number,
+                part_number=part_number,
+                f=message(" ({comment})", comment=newest.comment) if newest.comment else "",
+                made=made,
+            ),
             newest.model_dump(mode="json", exclude={"properties", "links"}),
         )
 

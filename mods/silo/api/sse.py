@@ -19,6 +19,7 @@ from pydantic import ValidationError
 
 from silo.api.wire import MergeEvent
 from silo.bom.errors import ServerFaultError
+from silo.bom.message import message
 
 MERGE = "bom_merge"
 HEARTBEAT = "heartbeat"
@@ -98,7 +99,10 @@ class SseParser:
                 events.append(event)
         if len(self._buffer) > self._max:
             raise ServerFaultError(
-                f"the event stream sent one event above {self._max / 1e6:.0f} MB, which is refused"
+                message(
+                    "the event stream sent one event above {max} MB, which is refused",
+                    max=f"{self._max / 1000000.0:.0f}",
+                )
             )
         return events
 

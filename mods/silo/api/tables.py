@@ -8,6 +8,7 @@ from typing import Any
 
 from silo.api.caller import Caller
 from silo.api.transport import ApiCall
+from silo.bom.message import message
 
 
 class TableCalls(Caller):
@@ -15,15 +16,23 @@ class TableCalls(Caller):
 
     def import_bom(self, part_number: str, data: bytes, /, **asked: str) -> dict[str, Any]:
         """Import a BOM with its levels. RejectedError lists all problems; then nothing was changed."""
-        return self._import(data, asked, f"the BOM of {part_number}", "items", part_number, "bom", "import")
+        return self._import(
+            data,
+            asked,
+            message("the BOM of {part_number}", part_number=part_number),
+            "items",
+            part_number,
+            "bom",
+            "import",
+        )
 
     def import_parts(self, data: bytes, /, **asked: str) -> dict[str, Any]:
         """Import a list of parts. RejectedError lists all problems; then nothing was changed."""
-        return self._import(data, asked, "the items", "items", "import")
+        return self._import(data, asked, message("the items"), "items", "import")
 
     def import_prices(self, data: bytes, /, **asked: str) -> dict[str, Any]:
         """Import a price list. RejectedError lists all problems; then nothing was changed."""
-        return self._import(data, asked, "the suppliers", "suppliers", "import")
+        return self._import(data, asked, message("the suppliers"), "suppliers", "import")
 
     def _import(
         self, data: bytes, asked: Mapping[str, str], subject: str, /, *segments: str

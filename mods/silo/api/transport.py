@@ -35,6 +35,7 @@ from silo.bom.errors import (
     SiloError,
     UnreachableError,
 )
+from silo.bom.message import message
 from silo.bom.numbers import whole_number
 
 MAX_REDIRECTS = 5
@@ -96,7 +97,7 @@ class _Bearer(AuthBase):
         return request
 
     def __repr__(self) -> str:
-        return "Bearer ***" if self._token else "no token"
+        return "Bearer ***" if self._token else message("no token")
 
 
 class Transport:
@@ -119,7 +120,9 @@ class Transport:
         self._retries = retries
         self._token = (token or "").strip() or None
         if not all("!" <= c <= "~" for c in self._token or ""):  # never quoted
-            raise ConfigError("the token holds blanks or characters that HTTP does not allow; copy it again")
+            raise ConfigError(
+                message("the token holds blanks or characters that HTTP does not allow; copy it again")
+            )
         self._verify = verify
         self._session = session or _new_session(timeouts.read)
         self._max_bytes, self._clock = max_bytes, clock
@@ -182,7 +185,10 @@ class Transport:
                 )
                 url, params = target, {}
         raise ServerFaultError(
-            f"{self.where(call.subject).asked} redirects in a circle; check the server address"
+            message(
+                "{asked} redirects in a circle; check the server address",
+                asked=self.where(call.subject).asked,
+            )
         )
 
     def _exchange(
@@ -224,12 +230,20 @@ class Transport:
                 size += len(piece)
                 if size > limit:
                     raise ServerFaultError(
-                        f"{where.asked} answered more than {limit / 1e6:g} MB, which is refused"
+                        message(
+                            "{asked} answered more than {limit} MB, which is refused",
+                            asked=where.asked,
+                            limit=f"{limit / 1000000.0:g}",
+                        )
                     )
                 yield piece
                 if self._clock() > deadline and not call.endless:
                     raise UnreachableError(
-                        f"{where.asked} took more than {self.timeouts.total:g} s to answer; try again later"
+                        message(
+                            "{asked} took more than {total} s to answer; try again later",
+                            asked=where.asked,
+                            total=f"{self.timeouts.total:g}",
+                        )
                     )
 
             _check_length(response, size, where)
@@ -258,14 +272,19 @@ def _check_length(response: requests.Response, size: int, where: Where) -> None:
     packed = "Content-Encoding" in response.headers or response.request.method == "HEAD"
     if length is not None and not packed and size < length:
         raise UnreachableError(
-            f"{where.asked} closed the connection after {size} of {length} bytes; try again"
+            message(
+                "{asked} closed the connection after {size} of {length} bytes; try again",
+                asked=where.asked,
+                size=size,
+                length=length,
+            )
         )
 
 
 def stop_if(cancelled: Cancel | None) -> None:
     """Raise :class:`CancelledError` if the caller asked to stop."""
     if cancelled is not None and cancelled.is_set():
-        raise CancelledError("stopped; what was sent before stays sent")
+        raise CancelledError(message("stopped; what was sent before stays sent"))
 
 
 def _check_redirect(
@@ -274,19 +293,37 @@ def _check_redirect(
     shown = f"{there[0]}://{urlsplit(target).netloc}"
     words = urlsplit(target).path.lower().strip("/").split("/")
     if _LOGIN.intersection(words) or words[:2] == ["auth", "oidc"]:
-        at = "" if there[1] == here[1] else f" at {shown}"
+        at = "" if there[1] == here[1] else message(" at {shown}", shown=shown)
         raise AuthError(
-            f"{home.host} wants a login{at}: there is no token, or it is not valid any more. "
-            "Give a valid token (SILO_API_TOKEN, or the settings)"
+            message(
+                "{host} wants a login{at}: there is no token, or it is not valid any more. Give a valid "
+                "token (SILO_API_TOKEN, or the settings)",
+                host=home.host,
+                at=at,
+            )
         )
     if here[0] == "http" and there[:2] == ("https", here[1]) and not may_carry_token(here, there):
-        raise ConfigError(f"{home.host} is served by https: set {shown} as the server address")
+        raise ConfigError(
+            message(
+                "{host} is served by https: set {shown} as the server address", host=home.host, shown=shown
+            )
+        )
     if here[0] == "https" and there[0] == "http":
-        raise ServerFaultError(f"{home.host} redirects from https to {shown}, which is not secure: refused")
+        raise ServerFaultError(
+            message(
+                "{host} redirects from https to {shown}, which is not secure: refused",
+                host=home.host,
+                shown=shown,
+            )
+        )
     if call.writing and not (status in (307, 308) and may_carry_token(here, there)):
         raise ServerFaultError(
-            f"{home.host} redirects a change to {shown}: not followed. If that is the Silo server, "
-            "set it as the server address"
+            message(
+                "{host} redirects a change to {shown}: not followed. If that is the Silo server, set it "
+                "as the server address",
+                host=home.host,
+                shown=shown,
+            )
         )
 
 

@@ -10,6 +10,7 @@ from silo.bom.entry import BomEntry, walk_entries
 from silo.bom.errors import counted, listed
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.items.naming import display_name
+from silo.bom.message import Message, message
 
 
 def consolidation_message(entry: BomEntry) -> str:
@@ -18,14 +19,20 @@ def consolidation_message(entry: BomEntry) -> str:
     count = entry.individual_links
     if count:
         what = counted(count, "individual link")
-        what += " beside a link array" if count == 1 else ""
+        what += message(" beside a link array") if count == 1 else ""
     else:
-        what = f"{entry.link_objects} link arrays" if entry.link_objects > 1 else "several links"
-    return f"{FindingCode.CONSOLIDATION.sentence.format(who=who, what=what)}{_ADVICE}"
+        what = (
+            message("{link_objects} link arrays", link_objects=entry.link_objects)
+            if entry.link_objects > 1
+            else message("several links")
+        )
+    return _hint(Message(FindingCode.CONSOLIDATION.sentence, {"who": who, "what": what}))
 
 
-_HINT = FindingCode.CONSOLIDATION.sentence.partition("{who}")[0]
-_ADVICE = f". {FindingCode.CONSOLIDATION.tail}"
+def _hint(hints: str) -> Message:
+    return message(
+        "[Silo BOM] {hints}. {advice}", hints=hints, advice=Message(FindingCode.CONSOLIDATION.tail)
+    )
 
 
 def one_hint_each(findings: Iterable[Finding]) -> tuple[Finding, ...]:
@@ -39,8 +46,8 @@ def one_hint_each(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 
 def _several_hints(hints: Sequence[Finding]) -> Finding:
-    text = listed([hint.message.removeprefix(_HINT).removesuffix(_ADVICE) for hint in hints])
-    return replace(hints[0], message=f"{_HINT}{text}{_ADVICE}")
+    each = [hint.message.values["hints"] for hint in hints if isinstance(hint.message, Message)]
+    return replace(hints[0], message=_hint(listed(each)))
 
 
 def consolidation_findings(entries: Iterable[BomEntry]) -> tuple[Finding, ...]:

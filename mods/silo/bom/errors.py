@@ -42,6 +42,8 @@ from functools import lru_cache
 from itertools import chain
 from typing import Any, ClassVar
 
+from silo.bom.message import Message, joined, message, template
+
 
 class Exit(IntEnum):
     """What every command and job ends with, and what documents and scripts rely on."""
@@ -68,12 +70,15 @@ def did_you_mean(given: str, candidates: Iterable[str]) -> str:
     does.
     """
     near = difflib.get_close_matches(given, list(candidates), 2, 0.7)
-    return f"; did you mean {' or '.join(near)}?" if near else ""
+    if len(near) > 1:
+        return message("; did you mean {first} or {second}?", first=near[0], second=near[1])
+    return message("; did you mean {name}?", name=near[0]) if near else ""
 
 
 def counted(number: int, singular: str, many: str = "") -> str:
     """Return "1 item" or "2 items"; ``many`` if the plural is not ``singular`` with an s."""
-    return f"{number} {singular if number == 1 else many or singular + 's'}"
+    # The script that collects the texts knows the nouns of each call.
+    return Message(f"{{n}} {singular}", {"n": number}, f"{{n}} {many or singular + 's'}")
 
 
 # As ``FreeCAD.Qt.translate``: (context, text) -> the text in the user's language.
@@ -87,16 +92,16 @@ def english(_context: str, text: str) -> str:
 
 def duration(seconds: float) -> str:
     """Write a span of time for people: 40 s, 10 min, 26 hours, 27000 days."""
-    for size, unit in ((86400.0, "days"), (3600.0, "hours"), (60.0, "min")):
+    for size, text in ((86400.0, template("{n} days")), (3600.0, template("{n} hours")), (60.0, "{n} min")):
         if seconds >= 2 * size:
-            return f"{seconds / size:.0f} {unit}"
+            return Message(text, {"n": f"{seconds / size:.0f}"})
     return f"{seconds:.0f} s"
 
 
 def listed(names: Sequence[str], most: int = 5) -> str:
     """List the first ``most`` names, and how many more there are: a, b and 3 more."""
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more
+    first = joined(", ", names[:most])
+    return message("{names} and {n} more", names=first, n=len(names) - most) if len(names) > most else first
 
 
 class Sentences:
@@ -195,7 +200,7 @@ class DocumentError(InputError):
     code = "bad_document"
 
     def __init__(self, path: str, reason: str) -> None:
-        super().__init__(f"{path}: {reason}")
+        super().__init__(message("{path}: {reason}", path=path, reason=reason))
         self.path = path
         self.reason = reason
 
@@ -324,7 +329,7 @@ class CycleError(ConflictError):
     code = "cycle"
 
     def __init__(self, path: Sequence[str]) -> None:
-        super().__init__(f"this BOM would contain itself: {' → '.join(path)}")
+        super().__init__(message("this BOM would contain itself: {path}", path=" → ".join(path)))
         self.path = tuple(path)
 
 

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Self
 
+from silo.bom.message import message
+
 
 class Severity(StrEnum):
     """How much a finding matters."""
@@ -361,7 +363,7 @@ class FindingCode(StrEnum):
         _W,
         "many single links to one part; an array would be clearer",
         "nothing; the count is right. An array is easier to change",
-        "[Silo BOM] {who} has {what}",
+        "{who} has {what}",
         "Consider using a link array (ElementCount) for cleaner assembly management.",
     )
     # identity
@@ -438,4 +440,7 @@ def respelt_findings(notes: Iterable[str], top: str) -> tuple[Finding, ...]:
     """Make the findings about files that were found by another spelling: another system does not find
     them.
     """
-    return tuple(Finding(FindingCode.RESPELT, Severity.WARNING, f"{note}.", (Place(top),)) for note in notes)
+    return tuple(
+        Finding(FindingCode.RESPELT, Severity.WARNING, message("{note}.", note=note), (Place(top),))
+        for note in notes
+    )

@@ -13,6 +13,8 @@ from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from typing import Any
 
+from silo.bom.message import joined, message
+
 # What Excel, LibreOffice and Google Sheets take for the beginning of a formula (OWASP, CSV injection).
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
 
@@ -196,10 +198,18 @@ def missing_columns(header: Sequence[str], at: Mapping[Heading, int], needed: Se
     lacking = [role for role in needed if role not in at]
     if not lacking:
         return ""
-    names = " and ".join(f"'{_title(role)}'" for role in lacking)
+    names = joined(message(" and "), (f"'{_title(role)}'" for role in lacking))
     seen = ", ".join(cell.strip() for cell in header if cell.strip())
-    others = "; ".join(f"'{_title(role)}' may also be called {_others(role)}" for role in lacking)
-    return f"there is no column {names}; the columns are {seen}. {others}"
+    others = [
+        message("'{title}' may also be called {others}", title=_title(role), others=_others(role))
+        for role in lacking
+    ]
+    return message(
+        "there is no column {names}; the columns are {seen}. {others}",
+        names=names,
+        seen=seen,
+        others=joined("; ", others),
+    )
 
 
 def _title(role: Heading) -> str:

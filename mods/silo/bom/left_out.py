@@ -19,7 +19,7 @@ from typing import Any
 from silo.bom.entry import BomEntry
 from silo.bom.findings import Finding
 from silo.bom.items.naming import display_name
-from silo.bom.message import Message, counted_message, joined
+from silo.bom.message import Message, beside, counted_message, joined
 from silo.bom.view.folders import shorten
 from silo.bom.walk.document import relative
 from silo.bom.walk.standard import STANDARD_PARTS
@@ -52,7 +52,7 @@ class LeftOut:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the fields that are set, as JSON values."""
-        return {key: value for key, value in asdict(self).items() if value}
+        return {key: value for key, value in asdict(self).items() if value} | beside(self.message)
 
 
 def components_of(entry: BomEntry, base: str) -> list[dict[str, str]]:
@@ -116,8 +116,8 @@ def remembered(
 def in_words(left_out: Sequence[LeftOut] | Sequence[Mapping[str, Any]]) -> str:
     """Write ``2 missing, 1 unregistered``; "" if nothing is left out."""
     reasons = Counter(str(out["reason"] if isinstance(out, Mapping) else out.reason) for out in left_out)
-    parts = [f"{reasons.pop(reason)} {reason}" for reason in Reason if reason in reasons]
-    return ", ".join([*parts, *(f"{count} {reason}" for reason, count in reasons.items())])
+    ordered = [*(reason for reason in Reason if reason in reasons), *reasons.keys() - set(Reason)]
+    return joined(", ", [Message(f"{{n}} {reason}", {"n": reasons[reason]}) for reason in ordered])
 
 
 def what_holds(left_out: Iterable[LeftOut] | Iterable[Mapping[str, Any]]) -> Message:

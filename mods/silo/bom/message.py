@@ -7,14 +7,16 @@ its template and its values, so that another language needs no guess about which
 * the template is the message's code, as gettext has it: ``The file {file} is missing``;
 * a value appears unchanged in each language; a value that is a message is translated by its own template;
 * a value never fills a place again: ``{name}`` inside a value stays;
-* what is made of a message by cutting or adding is a plain ``str``, which is shown as it is: put messages
-  together with :func:`message` and :func:`joined`.
+* ``str()`` of a message, and of an error that has one, is the message; what is added to a message with ``+``
+  makes a message;
+* what is made of a message by cutting it, or by an f-string or ``join``, is a plain ``str``, which is shown
+  as it is: put messages together with :func:`message` and :func:`joined`.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, Protocol, Self
 
@@ -46,11 +48,24 @@ class Message(str):
 
     def __new__(cls, template: str, values: Mapping[str, Any] | None = None, plural: str = "") -> Self:
         """Fill the template in English. Raises KeyError for a place without a value."""
-        kept = MappingProxyType(dict(values or {}))
+        # An exception or a path may change until the sentence is shown. An error gives its message.
+        kept = MappingProxyType({name: _kept(value) for name, value in (values or {}).items()})
         english = plural if plural and kept["n"] != 1 else template
         made = super().__new__(cls, _PLACE.sub(lambda place: str(kept[place[1]]), english))
         made.template, made.plural, made.values = template, plural, kept
         return made
+
+    def __str__(self) -> str:
+        """Stay a message."""
+        return self
+
+    def __add__(self, more: str, /) -> Message:
+        """Put a text behind; it stays as it is in each language."""
+        return joined("", (self, more)) if more else self
+
+    def __radd__(self, before: str, /) -> Message:
+        """Put a text before."""
+        return joined("", (before, self)) if before else self
 
     def __reduce__(self) -> tuple[type[Message], tuple[str, dict[str, Any], str]]:
         """Travel to another process whole."""
@@ -67,15 +82,15 @@ class Message(str):
     def as_json(self) -> dict[str, Any]:
         """Return template and values for JSON; values are messages, whole numbers or text."""
         values = {
-            name: value.as_json()
-            if isinstance(value, Message)
-            else value
-            if type(value) in (int, str)
-            else str(value)
+            name: value.as_json() if isinstance(value, Message) else value
             for name, value in self.values.items()
         }
         more = {"plural": self.plural} if self.plural else {}
         return {"template": self.template, **more, "values": values}
+
+
+def _kept(value: object) -> str | int:
+    return value if isinstance(value, Message) or type(value) in (int, str) else str(value)  # type: ignore[return-value]
 
 
 def message(template: str, /, **values: Any) -> Message:
@@ -88,10 +103,32 @@ def counted_message(n: int, singular: str, plural: str, /, **values: Any) -> Mes
     return Message(singular, {"n": n, **values}, plural)
 
 
+def template(text: str) -> str:
+    """Mark a template that stands in a table; its message is made with ``Message(text, values)``."""
+    return text
+
+
 def joined(separator: str, parts: Iterable[object]) -> Message:
-    """Put messages and texts side by side; each is translated by itself."""
-    values = {f"part{number}": part for number, part in enumerate(parts)}
+    """Put messages and texts side by side; each is translated by itself, and so is the separator."""
+    kept = [_kept(part) for part in parts]
+    if isinstance(separator, Message):
+        kept = [piece for part in kept for piece in (separator, part)][1:]
+        separator = ""
+    if not any(isinstance(part, Message) for part in kept):
+        return Message("{text}", {"text": separator.join(map(str, kept))})
+    values = {f"part{number}": part for number, part in enumerate(kept)}
     return Message(separator.join(f"{{{name}}}" for name in values), values)
+
+
+def altered(text: str, change: Callable[[str], str]) -> str:
+    """Change the texts in the values of a message, such as paths; a plain text as a whole."""
+    if not isinstance(text, Message):
+        return change(text)
+    values = {
+        name: altered(value, change) if isinstance(value, str) else value
+        for name, value in text.values.items()
+    }
+    return Message(text.template, values, text.plural)
 
 
 def filled(text: str, values: Mapping[str, object]) -> str:
@@ -101,7 +138,9 @@ def filled(text: str, values: Mapping[str, object]) -> str:
 
 def said(value: object, catalogue: Catalogue) -> str:
     """Return the text of a value: of a message in the language of the catalogue, of all else unchanged."""
-    return value.said(catalogue) if isinstance(value, Message) else str(value)
+    if isinstance(value, Message):
+        return value.said(catalogue)
+    return getattr(catalogue, "old_sentence", str)(value)
 
 
 def from_json(stored: object) -> Message | None:
@@ -113,4 +152,17 @@ def from_json(stored: object) -> Message | None:
         return None
     read = {str(name): from_json(value) or value for name, value in values.items()}
     places = set(_PLACE.findall(template) + _PLACE.findall(plural)) | ({"n"} if plural else set())
-    return Message(template, read, plural) if places <= read.keys() else None
+    counts = not plural or type(read.get("n")) is int
+    return Message(template, read, plural) if places <= read.keys() and counts else None
+
+
+def beside(text: str) -> dict[str, Any]:
+    """Return what JSON keeps beside the English sentence: template and values; {} for a plain text."""
+    return text.as_json() if isinstance(text, Message) else {}
+
+
+def read_beside(row: Mapping[str, Any], key: str = "message") -> str:
+    """Read the sentence of a row with what :func:`beside` keeps; the plain sentence if they do not agree."""
+    text = row[key]
+    made = from_json(row)
+    return made if made is not None and made == text else str(text)

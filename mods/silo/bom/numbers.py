@@ -30,6 +30,7 @@ from enum import StrEnum
 from fractions import Fraction
 from typing import NamedTuple
 
+from silo.bom.message import message
 from silo.bom.quantities import LARGEST_QUANTITY, plain
 from silo.bom.units import known_unit
 
@@ -137,11 +138,13 @@ def read_number(text: str, mark: Mark | None = None, *, points_are_decimal: bool
         mark = Mark.POINT
     number = parse_number(text, mark)
     if number is None:
-        return NumberReading(None, f"wanted a number such as 4 or 2.5, got {shown}")
+        return NumberReading(None, message("wanted a number such as 4 or 2.5, got {shown}", shown=shown))
     if number.other is not None:
-        ways = f"{plain(number.other)} or {plain(number.exact)}"
-        write = f"{plain(number.other)} or {number.exact:f}0"
-        return NumberReading(None, f"{shown} can be read as {ways}; write {write}")
+        ways = message("{other} or {exact}", other=plain(number.other), exact=plain(number.exact))
+        write = message("{other} or {exact}0", other=plain(number.other), exact=f"{number.exact:f}")
+        return NumberReading(
+            None, message("{shown} can be read as {ways}; write {write}", shown=shown, ways=ways, write=write)
+        )
     return NumberReading(number.exact)
 
 
@@ -160,7 +163,12 @@ def read_quantity(text: str, mark: Mark | None = None, *, points_are_decimal: bo
     """Read the quantity of a BOM line: a number above 0 and at most 1e9."""
     reading = read_count(text, mark, points_are_decimal=points_are_decimal)
     if reading.value is not None and not 0 < reading.value <= Decimal(LARGEST_QUANTITY):
-        return NumberReading(None, f"wanted a number above 0 and at most 1e9, got “{text.strip()[:LONGEST]}”")
+        return NumberReading(
+            None,
+            message(
+                "wanted a number above 0 and at most 1e9, got “{longest}”", longest=text.strip()[:LONGEST]
+            ),
+        )
     return reading
 
 

@@ -9,6 +9,8 @@ from functools import reduce
 from math import isclose, isfinite
 from typing import overload
 
+from silo.bom.message import message
+
 LARGEST_QUANTITY = 1e9
 """The most pieces (or metres, or litres) of a BOM line."""
 
@@ -21,7 +23,7 @@ def as_decimal(value: float | int | Decimal) -> Decimal:
         return value
     if isinstance(value, float):
         if not isfinite(value):
-            raise ValueError(f"wanted a finite number, got {value}")
+            raise ValueError(message("wanted a finite number, got {value}", value=value))
         return Decimal(repr(value))
     return Decimal(value)
 

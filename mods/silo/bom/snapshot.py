@@ -15,6 +15,7 @@ from typing import Any
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import InputError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
+from silo.bom.message import beside, message, read_beside
 
 FORMAT = 1
 
@@ -41,7 +42,13 @@ def to_plain(extraction: Extraction) -> dict[str, Any]:
 def from_plain(data: Mapping[str, Any]) -> Extraction:
     """Read the extraction that :func:`to_plain` wrote. Raises InputError for anything else."""
     if data.get("format") != FORMAT:
-        raise InputError(f"expected a BOM snapshot of format {FORMAT}, got {data.get('format')!r}")
+        raise InputError(
+            message(
+                "expected a BOM snapshot of format {format}, got {data}",
+                format=FORMAT,
+                data=repr(data.get("format")),
+            )
+        )
     try:
         entries: list[BomEntry] = []
         for row in data["table"]:
@@ -52,7 +59,7 @@ def from_plain(data: Mapping[str, Any]) -> Extraction:
             findings=tuple(_finding(finding) for finding in data["findings"]),
         )
     except (KeyError, IndexError, TypeError, ValueError) as error:
-        raise InputError(f"this BOM snapshot is not complete: {error!r}") from error
+        raise InputError(message("this BOM snapshot is not complete: {error}", error=repr(error))) from error
 
 
 def whole_row(row: Mapping[str, Any]) -> dict[str, Any]:
@@ -99,6 +106,7 @@ def _plain_finding(finding: Finding) -> dict[str, Any]:
         "code": finding.code.value,
         "severity": finding.severity.value,
         "message": finding.message,
+        **beside(finding.message),
         "where": [[place.doc_path, place.obj] for place in finding.where],
         "file": finding.file,
         "did_you_mean": finding.did_you_mean,
@@ -109,7 +117,7 @@ def _finding(data: Mapping[str, Any]) -> Finding:
     return Finding(
         FindingCode[data["code"].upper()],
         Severity(data["severity"]),
-        data["message"],
+        read_beside(data),
         tuple(Place(path, obj) for path, obj in data["where"]),
         data.get("file", ""),
         data.get("did_you_mean", ""),

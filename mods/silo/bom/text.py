@@ -11,6 +11,8 @@ import re
 import unicodedata
 from functools import cache
 
+from silo.bom.message import message
+
 # A class of a regular expression: control characters but tab and line ends, and Unicode's non-characters.
 # XML, and so a workbook, has no place for them. No text may have one of them, nor half of a surrogate pair.
 REFUSED_CHARACTERS = r"\u0000-\u0008\u000b\u000c\u000e-\u001f\u007f-\u009f\ufdd0-\ufdef" + "".join(
@@ -31,9 +33,11 @@ def character_problem(text: str) -> str | None:
     refused = _REFUSED.search(text)
     if refused is None:
         return None
-    return (
-        f"wanted text without control characters and non-characters, got U+{ord(refused[0]):04X} as its "
-        f"character {refused.start() + 1}; type it again instead of pasting it"
+    return message(
+        "wanted text without control characters and non-characters, got U+{refused} as its "
+        "character {refused1}; type it again instead of pasting it",
+        refused=f"{ord(refused[0]):04X}",
+        refused1=refused.start() + 1,
     )
 
 

@@ -63,12 +63,19 @@ def _described(kind: Any, words: str) -> Any:
 
 
 Place = _shape("Place", file=str, object=str)
-Error = _shape("Error", code=str, message=str)
+# What a message is made of, beside its English sentence.
+_MADE_OF: dict[str, Any] = {
+    "template": (_described(str, "the message with {name} for each value: its code"), ""),
+    "plural": (_described(str, "the template for other numbers than one"), ""),
+    "values": (_described(dict[str, Any], "name → text, number, or a message of its own"), {}),
+}
+Error = _shape("Error", code=str, message=str, **_MADE_OF)
 Finding = _shape(
     "Finding",
     code=FindingCode,
     severity=Severity,
     message=str,
+    **_MADE_OF,
     where=_many(Place),
     file=(_described(str, "the file that a broken link records"), ""),
     did_you_mean=(_described(str, "the file that was probably meant"), ""),

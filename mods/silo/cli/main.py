@@ -125,9 +125,11 @@ def _as_json(error: SiloError) -> dict[str, Any]:
 def _failed(error: SiloError, words: Sequence[str]) -> int:
     """Print an error as a sentence, and with --json as an object on standard output."""
     text = str(error)
-    print(text if isinstance(error, CancelledError) else f"silo-mod: {text}", file=sys.stderr)
+    print(
+        text if isinstance(error, CancelledError) else message("silo-mod: {text}", text=text), file=sys.stderr
+    )
     for problem in getattr(error, "problems", ()):
-        print(f"  - {problem}", file=sys.stderr)
+        print(message("  - {problem}", problem=problem), file=sys.stderr)
     if "--json" in words and not getattr(sys.stdout, "begun", True):
         from silo.cli.json_output import print_json
 
@@ -140,13 +142,17 @@ def _refuse_empty(args: argparse.Namespace) -> None:
     for name, value in vars(args).items():
         empty = value == "" or (isinstance(value, list) and "" in value)
         if empty and name not in ("server", "token"):  # those have a sentence of their own
-            raise InputError(f"the argument {name.upper()} is empty (''); leave it out, or give it a value")
+            raise InputError(
+                message(
+                    "the argument {name} is empty (''); leave it out, or give it a value", name=name.upper()
+                )
+            )
 
 
 def _system_said_no(error: OSError) -> InputError:
     """Describe why a file or the output cannot be written: no such folder, no right, a full disk."""
-    what = error.filename or "the output cannot be written"
-    return InputError(f"{what}: {error.strerror or error}")
+    what = error.filename or message("the output cannot be written")
+    return InputError(message("{what}: {error}", what=what, error=error.strerror or error))
 
 
 if __name__ == "__main__":

@@ -12,13 +12,41 @@ from typing import Any, NoReturn
 
 from silo import spoken
 from silo.bom.errors import InputError, did_you_mean
+from silo.bom.message import Message, message, template
 from silo.cli.command_table import THEMES
 
-_EPILOG = """exit codes: 0 done, 1 differences or something left undone, 2 bad input, 3 server, 130 cancelled
+_EPILOG = message(
+    "exit codes: 0 done, 1 differences or something left undone, 2 bad input, 3 "
+    "server, 130 cancelled\n\nThe server and the token come from --server and --token, "
+    "else from SILO_API_URL and SILO_API_TOKEN, else from the configuration file. "
+    "`silo-mod serve` starts a server of your own; `silo-mod demo` shows it all at "
+    "once."
+)
 
-The server and the token come from --server and --token, else from SILO_API_URL and SILO_API_TOKEN, else \
-from the configuration file. `silo-mod serve` starts a server of your own; `silo-mod demo` shows it all at \
-once."""
+
+# What argparse says of bad arguments, in words that it makes itself.
+_ARGPARSE = (
+    template("the following arguments are required: {arguments}"),
+    template("unrecognized arguments: {arguments}"),
+    template("argument {argument}: invalid choice: {choice} (choose from {choices})"),
+    template("argument {argument}: invalid {type} value: {value}"),
+    template("argument {argument}: expected one argument"),
+    template("argument {argument}: expected at least one argument"),
+    template("argument {argument}: not allowed with argument {other}"),
+    template("one of the arguments {arguments} is required"),
+    template("argument {argument}: {problem}"),
+)
+
+
+def _said_by_argparse(sentence: str) -> str:
+    """Make a message of a sentence of argparse."""
+    if isinstance(sentence, Message):
+        return sentence
+    for text in _ARGPARSE:
+        places = re.sub(r"\\\{(\w+)\\\}", r"(?P<\1>.+?)", re.escape(text))
+        if found := re.fullmatch(places, sentence, re.DOTALL):
+            return Message(text, found.groupdict())
+    return sentence
 
 
 class _Help(argparse.RawDescriptionHelpFormatter):
@@ -51,7 +79,7 @@ class _Parser(argparse.ArgumentParser):
         words = self._known_words()
         given = re.search(r"(?:invalid choice: '|unrecognized arguments: )([^' =]+)", message)
         self.print_usage(sys.stderr)
-        raise InputError(message + (did_you_mean(given[1], words) if given else ""))
+        raise InputError(_said_by_argparse(message) + (did_you_mean(given[1], words) if given else ""))
 
     def format_help(self) -> str:
         for action in self._actions:
@@ -88,7 +116,7 @@ def build_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
         lines.append(f"\n{spoken(theme)}:")
         for name, (module, text, example) in names.items():
             help_text = spoken(text)
-            lines.append(f"  {name:<14} {help_text}")
+            lines.append(message("  {name} {help_text}", name=f"{name:<14}", help_text=help_text))
             one = commands.add_parser(
                 name,
                 help=help_text,
@@ -124,5 +152,5 @@ class _Version(argparse.Action):
         try:
             print(f"silo-mod {version('silo-mod')}")
         except PackageNotFoundError:
-            print("silo-mod (not installed)")  # run from a checkout
+            print(message("silo-mod (not installed)"))  # run from a checkout
         parser.exit()

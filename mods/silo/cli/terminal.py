@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from silo import spoken
+from silo.bom.message import Message, altered
 
 # A hostile file's name may have 60 MB; a path of the system has 4096 at most.
 _LONGEST = 5000
@@ -49,6 +50,8 @@ def plain(text: str) -> str:
     """Replace control characters in text of a file or a server, and cut it: it may neither steer the terminal
     nor fill it.
     """
+    if isinstance(text, Message):
+        return altered(text, plain)
     shown = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
     return "".join(c if c.isprintable() else "�" for c in shown)
 

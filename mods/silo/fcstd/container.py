@@ -19,6 +19,7 @@ from struct import Struct
 from typing import Any, NamedTuple
 
 from silo.bom.findings import FindingCode
+from silo.bom.message import message
 from silo.fcstd.errors import FcstdError
 from silo.fcstd.limits import Limits
 
@@ -98,7 +99,7 @@ class Directory(NamedTuple):
         raw, position = self.raw, 0
         for _ in range(self.entry_count):
             if raw[position : position + 4] != _CENTRAL_MARK or position + CENTRAL.size > len(raw):
-                raise ValueError("its directory is damaged")
+                raise ValueError(message("its directory is damaged"))
             name_length, extra, comment = _LENGTHS.unpack_from(raw, position + 28)
             name_at = position + CENTRAL.size
             name = raw[name_at : name_at + name_length]
@@ -106,13 +107,13 @@ class Directory(NamedTuple):
                 yield self._entry(name, position)
             position = name_at + name_length + extra + comment
         if position > len(raw):
-            raise ValueError("its directory is damaged")
+            raise ValueError(message("its directory is damaged"))
 
     def _entry(self, name: bytes, position: int) -> ZipEntry:
         fields = CENTRAL.unpack_from(self.raw, position)
         flags, method, crc, packed, size, offset = fields[3], fields[4], *fields[7:10], fields[16]
         if 0xFFFFFFFF in (packed, size, offset):
-            raise ValueError("it is in the ZIP64 format, which FreeCAD does not write")
+            raise ValueError(message("it is in the ZIP64 format, which FreeCAD does not write"))
         return ZipEntry(name, flags, method, crc, packed, size, offset + self.shift, position)
 
 
@@ -149,7 +150,13 @@ class ContainerFile:
         except ValueError as error:
             raise self._error(str(error)) from error
         if len(entries) > 1:
-            raise self._error(f"it holds {len(entries)} entries named {name.decode('ascii', 'replace')}")
+            raise self._error(
+                message(
+                    "it holds {count} entries named {name}",
+                    count=len(entries),
+                    name=name.decode("ascii", "replace"),
+                )
+            )
         return entries[0] if entries else None
 
     def packed(self, entry: ZipEntry, most: int) -> bytes:
@@ -171,13 +178,13 @@ class ContainerFile:
         entry.
         """
         if len(local) < LOCAL.size or not local.startswith(_LOCAL_MARK):
-            raise self._error("it is damaged: an entry lies outside its place")
+            raise self._error(message("it is damaged: an entry lies outside its place"))
         fields = LOCAL.unpack_from(local)
         if local[LOCAL.size : LOCAL.size + fields[9]] != entry.name:
-            raise self._error("it is damaged: its directory and its entries disagree")
+            raise self._error(message("it is damaged: its directory and its entries disagree"))
         begin: int = LOCAL.size + fields[9] + fields[10]
         if entry.offset + begin + entry.packed > self.directory.offset:
-            raise self._error("it is damaged: an entry lies outside its place")
+            raise self._error(message("it is damaged: an entry lies outside its place"))
         return begin
 
     def read(self, offset: int, length: int) -> bytes:
@@ -187,17 +194,30 @@ class ContainerFile:
     def _check(self, entry: ZipEntry, most: int) -> None:
         name = entry.name.decode("utf-8", "replace")
         if entry.flags & _ENCRYPTED:
-            raise self._error(f"its {name} is encrypted")
+            raise self._error(message("its {name} is encrypted", name=name))
         if entry.method not in (STORED, _DEFLATED):
-            raise self._error(f"its {name} is packed by method {entry.method}, which FreeCAD does not use")
+            raise self._error(
+                message(
+                    "its {name} is packed by method {method}, which FreeCAD does not use",
+                    name=name,
+                    method=entry.method,
+                )
+            )
         if entry.packed > most:
-            raise self._error(f"its {name} is too large: {entry.packed} bytes packed, at most {most}")
+            raise self._error(
+                message(
+                    "its {name} is too large: {packed} bytes packed, at most {most}",
+                    name=name,
+                    packed=entry.packed,
+                    most=most,
+                )
+            )
 
     def _regular_file(self) -> FileStat:
         status = os.fstat(self._descriptor)
         if not stat.S_ISREG(status.st_mode):
-            kind = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
-            raise self._error(f"it is {kind}, not a FreeCAD document")
+            kind = message("a folder") if stat.S_ISDIR(status.st_mode) else message("no regular file")
+            raise self._error(message("it is {kind}, not a FreeCAD document", kind=kind))
         self.changed_ns = status.st_ctime_ns
         return FileStat.of(status)
 
@@ -227,11 +247,11 @@ class ContainerFile:
     def _directory_at(self, end: int, fields: tuple[int, ...]) -> Directory:
         _, disk, first_disk, here, count, size, offset, _ = fields
         if 0xFFFFFFFF in (size, offset) or count == 0xFFFF:
-            raise self._error("it is in the ZIP64 format, which FreeCAD does not write")
+            raise self._error(message("it is in the ZIP64 format, which FreeCAD does not write"))
         shift = end - size - offset
         sane = not disk and not first_disk and here == count and shift >= 0
         if not sane or count > self.limits.entries or size > self.limits.packed:
-            raise self._error("its zip directory is damaged or absurdly large")
+            raise self._error(message("its zip directory is damaged or absurdly large"))
         raw = self._read(end - size, size)
         return Directory(raw, count, end - size, shift, self._window[end - self._window_at :])
 
@@ -239,31 +259,31 @@ class ContainerFile:
         if self._read(0, min(self.state.size, len(_LFS_MARK))) == _LFS_MARK:
             return FcstdError(
                 self.path,
-                "it is a Git LFS pointer, not the file itself; fetch it with `git lfs pull`",
+                message("it is a Git LFS pointer, not the file itself; fetch it with `git lfs pull`"),
                 FindingCode.LFS_POINTER,
                 self.state,
             )
         if self.state.size == 0:
-            return self._error("it is empty")
+            return self._error(message("it is empty"))
         if self._read(0, min(4, self.state.size)) == _LOCAL_MARK:
-            return self._error("it is cut short: the end of its zip container is missing")
-        return self._error("it is not a FreeCAD document (no zip container)")
+            return self._error(message("it is cut short: the end of its zip container is missing"))
+        return self._error(message("it is not a FreeCAD document (no zip container)"))
 
     def _read(self, offset: int, length: int) -> bytes:
         begin = offset - self._window_at
         if begin >= 0 and begin + length <= len(self._window):
             return self._window[begin : begin + length]
         if offset + length > self.state.size:  # also keeps a claimed length from being allocated
-            raise self._error("it is cut short")
+            raise self._error(message("it is cut short"))
         try:
             os.lseek(self._descriptor, offset, os.SEEK_SET)
             data = os.read(self._descriptor, length)
             while len(data) < length and (more := os.read(self._descriptor, length - len(data))):
                 data += more
         except OSError as error:
-            raise self._error(f"it cannot be read: {_reason(error)}") from error
+            raise self._error(message("it cannot be read: {error}", error=_reason(error))) from error
         if len(data) < length:
-            raise self._error("it is cut short")
+            raise self._error(message("it is cut short"))
         return data
 
     def _error(self, reason: str) -> FcstdError:
@@ -278,9 +298,9 @@ def _open(path: str) -> int:
     try:
         return os.open(path, _FLAGS)
     except (FileNotFoundError, NotADirectoryError) as error:
-        raise FcstdError(path, "there is no such file", FindingCode.MISSING_FILE) from error
+        raise FcstdError(path, message("there is no such file"), FindingCode.MISSING_FILE) from error
     except (OSError, ValueError) as error:
-        raise FcstdError(path, f"it cannot be opened: {_reason(error)}") from error
+        raise FcstdError(path, message("it cannot be opened: {error}", error=_reason(error))) from error
 
 
 class Inflater:
@@ -298,7 +318,9 @@ class Inflater:
         self.produced = 0
         self.finished = False
         if entry.size > most:
-            raise self._error(f"is too large: {entry.size} bytes unpacked, at most {most}")
+            raise self._error(
+                message("is too large: {size} bytes unpacked, at most {most}", size=entry.size, most=most)
+            )
 
     def step(self, length: int) -> bytes:
         """Unpack up to ``length`` (> 0) more bytes; b"" and ``finished`` at the end. Raises FcstdError."""
@@ -318,7 +340,7 @@ class Inflater:
                 self._packed, -zlib.MAX_WBITS, bufsize=max(1, min(self._entry.size, highest))
             )
         except zlib.error as error:
-            raise self._error("is damaged (it cannot be unpacked)") from error
+            raise self._error(message("is damaged (it cannot be unpacked)")) from error
         self.finished = True
         self._count(data)
         return data
@@ -345,13 +367,13 @@ class Inflater:
         try:
             data: bytes = engine.decompress(self._rest, length)
         except zlib.error as error:
-            raise self._error("is damaged (it cannot be unpacked)") from error
+            raise self._error(message("is damaged (it cannot be unpacked)")) from error
         self._rest = engine.unconsumed_tail
         if engine.eof:
             self.finished = True
             self._engine = None  # its buffers are larger than most files, and many texts stay in memory
         elif not data and not self._rest:
-            raise self._error("is damaged (it ends too early)")
+            raise self._error(message("is damaged (it ends too early)"))
         return data
 
     def _count(self, data: bytes) -> None:
@@ -359,20 +381,27 @@ class Inflater:
         self._crc = zlib.crc32(data, self._crc)
         limits, size = self._limits, self._entry.size
         if produced > size:
-            raise self._error("is damaged (it is longer than the directory says)")
+            raise self._error(message("is damaged (it is longer than the directory says)"))
         if produced > limits.ratio_from and produced > limits.ratio * len(self._packed):
-            raise self._error(f"is packed more than {limits.ratio} times, as zip bombs are")
+            raise self._error(
+                message("is packed more than {ratio} times, as zip bombs are", ratio=limits.ratio)
+            )
         if self.finished and (produced != size or self._crc != self._entry.crc):
-            raise self._error("is damaged (its length or checksum is wrong)")
+            raise self._error(message("is damaged (its length or checksum is wrong)"))
 
     def _error(self, reason: str) -> FcstdError:
-        return FcstdError(self._path, f"its {self._entry.name.decode('utf-8', 'replace')} {reason}")
+        return FcstdError(
+            self._path,
+            message("its {name} {reason}", name=self._entry.name.decode("utf-8", "replace"), reason=reason),
+        )
 
 
 def document_xml(container: ContainerFile, limits: Limits) -> tuple[ZipEntry, bytes]:
     """Return the entry Document.xml and its unpacked text. Raises DocumentError."""
     entry = container.entry(DOCUMENT_XML)
     if entry is None:
-        raise FcstdError(container.path, "it is not a FreeCAD document (there is no Document.xml in it)")
+        raise FcstdError(
+            container.path, message("it is not a FreeCAD document (there is no Document.xml in it)")
+        )
     packed = container.packed(entry, limits.packed)
     return entry, Inflater(container.path, entry, packed, limits.document_xml, limits).whole()

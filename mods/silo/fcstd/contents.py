@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
+from silo.bom.message import message
 from silo.fcstd.container import DOCUMENT_XML, ContainerFile, Directory, FileStat
 from silo.fcstd.errors import FcstdError
 from silo.fcstd.facts import Remembered
@@ -112,10 +113,12 @@ class FileContents:
         with ContainerFile(self._instead.get(path, path), self.limits) as container:
             entry = container.entry(DOCUMENT_XML)
             if entry is None:
-                reason = "it is not a FreeCAD document (there is no Document.xml in it)"
+                reason = message("it is not a FreeCAD document (there is no Document.xml in it)")
                 raise FcstdError(path, reason, state=container.state)
             packed = container.packed(entry, self.limits.packed)
             if container.changed():
-                raise FcstdError(path, "it is being written just now; try again", state=container.state)
+                raise FcstdError(
+                    path, message("it is being written just now; try again"), state=container.state
+                )
             xml = XmlText(path, entry, packed, self.limits, self.shared)
             return Content(xml, container.directory, container.state, container.changed_ns, read_ns)

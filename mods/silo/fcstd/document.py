@@ -13,6 +13,7 @@ from struct import Struct
 from typing import TYPE_CHECKING, Any, cast
 
 from silo.bom.findings import FindingCode
+from silo.bom.message import message
 from silo.bom.walk.document import LinkProblem as Problem
 from silo.bom.walk.kinds import Kind
 from silo.fcstd.container import ContainerFile, Inflater, ZipEntry
@@ -140,7 +141,13 @@ class FcstdDocument:
         """Return a document property. AttributeError if there is none, or none with a plain value."""
         value = self.Label if name == "Label" else self._value(name)
         if value is ABSENT:
-            raise AttributeError(f"the document {self.FileName} has no readable property {name!r}")
+            raise AttributeError(
+                message(
+                    "the document {filename} has no readable property {name}",
+                    filename=self.FileName,
+                    name=repr(name),
+                )
+            )
         return value
 
     def __getattr__(self, name: str) -> Any:
@@ -251,7 +258,7 @@ class FcstdDocument:
             return ()
         entry = self._entries.get(entry_name.encode())
         if entry is None:
-            raise FcstdError(self.FileName, f"its {entry_name} is missing")
+            raise FcstdError(self.FileName, message("its {entry_name} is missing", entry_name=entry_name))
         if entry.size <= _SIZE.size:  # an empty list; there is one for every link
             return ()
         data = self._side_entry(entry)
@@ -259,7 +266,10 @@ class FcstdDocument:
         form = _DOUBLES if self._xml.attribute("FileVersion", "0") != "0" else _FLOATS
         (count,) = _SIZE.unpack_from(data)
         if len(data) != _SIZE.size + count * form.size:
-            raise FcstdError(self.FileName, f"its {entry_name} is damaged (its length is wrong)")
+            raise FcstdError(
+                self.FileName,
+                message("its {entry_name} is damaged (its length is wrong)", entry_name=entry_name),
+            )
         return tuple(Vector(*numbers) for numbers in form.iter_unpack(data[_SIZE.size :]))
 
     def shape_key(self, entry_name: str) -> str:
@@ -334,6 +344,8 @@ class FcstdDocument:
         limits = self._xml.limits
         with ContainerFile(self.FileName, limits) as container:
             if container.state != self.state:
-                raise FcstdError(self.FileName, "it was changed while it was being read; read it again")
+                raise FcstdError(
+                    self.FileName, message("it was changed while it was being read; read it again")
+                )
             packed = container.packed(entry, limits.packed)
             return Inflater(self.FileName, entry, packed, limits.side_entry, limits).rest()

@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterable
 from typing import BinaryIO
 
 from silo.bom.errors import DocumentError
+from silo.bom.message import message
 from silo.fcstd.container import ContainerFile, FileStat, ZipEntry, document_xml
 from silo.fcstd.errors import FcstdError
 from silo.fcstd.limits import Limits
@@ -39,7 +40,7 @@ Edit = Callable[[bytes], bytes]
 
 def changed(path: str) -> FcstdError:
     """Make the error that somebody else changed the file meanwhile."""
-    return FcstdError(path, "it was changed by somebody else meanwhile; nothing was written")
+    return FcstdError(path, message("it was changed by somebody else meanwhile; nothing was written"))
 
 
 def check_writable(path: str) -> None:
@@ -47,15 +48,19 @@ def check_writable(path: str) -> None:
     # Asked of the mode: an administrator may write anything, and replacing a file needs no right to it at
     # all.
     if not os.stat(path).st_mode & stat.S_IWUSR or not os.access(path, os.W_OK):
-        raise DocumentError(path, "it is read-only; nothing was written")
+        raise DocumentError(path, message("it is read-only; nothing was written"))
     if not os.access(os.path.dirname(path), os.W_OK):
-        raise DocumentError(path, "its folder is read-only; nothing was written")
+        raise DocumentError(path, message("its folder is read-only; nothing was written"))
     names = os.stat(path).st_nlink
     if names > 1:
         raise DocumentError(
             path,
-            f"it has {names} names on this disk (hard links), and the others would keep the old content; "
-            "nothing was written. Make it a file of its own: copy it, then put the copy in its place",
+            message(
+                "it has {names} names on this disk (hard links), and the others would keep the old "
+                "content; nothing was written. Make it a file of its own: copy it, then put the copy in "
+                "its place",
+                names=names,
+            ),
         )
 
 
@@ -65,7 +70,9 @@ def edited_xml(container: ContainerFile, edit: Edit, limits: Limits) -> tuple[Zi
     try:
         return entry, edit(text)
     except ValueError as error:
-        raise FcstdError(container.path, f"its Document.xml {error}; nothing was written") from error
+        raise FcstdError(
+            container.path, message("its Document.xml {error}; nothing was written", error=error)
+        ) from error
 
 
 def replace_file(path: str, state: FileStat, content: Iterable[Piece], check: Callable[[str], None]) -> None:
@@ -78,7 +85,9 @@ def replace_file(path: str, state: FileStat, content: Iterable[Piece], check: Ca
     try:
         _write(path, state, content, check)
     except OSError as error:
-        raise DocumentError(path, f"it cannot be written: {error.strerror or error}") from error
+        raise DocumentError(
+            path, message("it cannot be written: {error}", error=error.strerror or error)
+        ) from error
 
 
 def _write(path: str, state: FileStat, content: Iterable[Piece], check: Callable[[str], None]) -> None:

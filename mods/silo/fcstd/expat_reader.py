@@ -13,6 +13,8 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
+from silo.bom.message import message
+
 Span = tuple[int, int]
 
 _ENCODINGS = {"utf-8", "utf8", "us-ascii", "ascii", "utf-16", "utf-16le", "utf-16be", "iso-8859-1", "latin-1"}
@@ -56,12 +58,16 @@ class _XmlWalk:
             parser.Parse(self.text, True)
         except expat.ExpatError as error:
             reason = expat.ErrorString(error.code) or "unknown"
-            raise Malformed(f"is no well-formed XML: {reason}, line {error.lineno}") from error
+            raise Malformed(
+                message("is no well-formed XML: {reason}, line {lineno}", reason=reason, lineno=error.lineno)
+            ) from error
 
     def _start(self, parser: expat.XMLParserType, tag: str, attributes: dict[str, str]) -> None:
         self.depth += 1
         if self.depth > self.depth_limit:
-            raise Malformed(f"is nested more than {self.depth_limit} levels deep")
+            raise Malformed(
+                message("is nested more than {depth_limit} levels deep", depth_limit=self.depth_limit)
+            )
         self.open_at(self.depth, tag, attributes, parser.CurrentByteIndex)
 
     def _end(self, parser: expat.XMLParserType, tag: str) -> None:
@@ -73,7 +79,7 @@ class _XmlWalk:
 
 
 def _refuse_doctype(*_: object) -> None:
-    raise Refused("has a document type (DOCTYPE), which FreeCAD does not write; it is not read")
+    raise Refused(message("has a document type (DOCTYPE), which FreeCAD does not write; it is not read"))
 
 
 def as_utf8(raw: bytes) -> bytes:
@@ -86,11 +92,13 @@ def as_utf8(raw: bytes) -> bytes:
     if encoding in ("utf-8", "utf8", "us-ascii", "ascii"):
         return raw
     if encoding not in _ENCODINGS:
-        raise Malformed(f"is written in {encoding}; FreeCAD writes UTF-8")
+        raise Malformed(message("is written in {encoding}; FreeCAD writes UTF-8", encoding=encoding))
     try:
         return _DECLARATION.sub("", raw.decode(encoding), count=1).encode()
     except UnicodeError as error:
-        raise Malformed(f"is not in the encoding that it names, {encoding}") from error
+        raise Malformed(
+            message("is not in the encoding that it names, {encoding}", encoding=encoding)
+        ) from error
 
 
 @dataclass(slots=True)
@@ -106,7 +114,7 @@ class _DocumentIndex:
         self.path.append(tag)
         if depth == 1:
             if tag != "Document":
-                raise Malformed(f"is not a FreeCAD document: it begins with <{tag}>")
+                raise Malformed(message("is not a FreeCAD document: it begins with <{tag}>", tag=tag))
             self.head.attributes = dict(attributes)
         elif depth == 2 and tag == "Properties":
             self.begin = at
@@ -118,18 +126,20 @@ class _DocumentIndex:
         if section == "Objects":
             if not name or name in self.head.types:
                 raise Malformed(
-                    f"lists an object {name!r} twice" if name else "lists an object without a name"
+                    message("lists an object {name} twice", name=repr(name))
+                    if name
+                    else message("lists an object without a name")
                 )
             self.head.types[name] = attributes.get("type", "")
         elif section == "ObjectData":
             if name in self.data:
-                raise Malformed(f"holds the data of the object {name!r} twice")
+                raise Malformed(message("holds the data of the object {name} twice", name=repr(name)))
             self.name, self.begin = name, at
 
     def close_at(self, depth: int, tag: str, end: int) -> None:
         if depth == 2 and tag == "Properties":
             if self.head.properties is not None:
-                raise Malformed("holds the properties of the document twice")
+                raise Malformed(message("holds the properties of the document twice"))
             self.head.properties = (self.begin, end)
         elif depth == 3 and tag == "Object" and self.path[1] == "ObjectData":
             self.data[self.name] = (self.begin, end)
@@ -159,7 +169,7 @@ def index_properties(text: bytes, depth_limit: int) -> dict[str, Span]:
     def close_at(depth: int, tag: str, end: int) -> None:
         if depth == level and tag == "Property" and path[level - 2] == "Properties":
             if name in spans:
-                raise Malformed(f"has the property {name!r} twice")
+                raise Malformed(message("has the property {name} twice", name=repr(name)))
             spans[name] = (begin, end)
 
     _XmlWalk(text, depth_limit, open_at, close_at).run()

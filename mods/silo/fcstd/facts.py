@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from silo.bom.message import message
 from silo.bom.walk.kinds import Kind
 from silo.fcstd.container import Directory, FileStat
 from silo.fcstd.errors import FcstdError
@@ -128,7 +129,7 @@ class Remembered:
     def _content(self) -> Content:
         content = self._contents.read(self._path)
         if content.digest != self.digest:
-            raise FcstdError(self._path, "it is being written just now; try again", state=self.state)
+            raise FcstdError(self._path, message("it is being written just now; try again"), state=self.state)
         return content
 
     @property

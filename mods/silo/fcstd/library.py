@@ -9,6 +9,7 @@ from pathlib import Path
 
 from silo.bom.errors import InputError
 from silo.bom.findings import FindingCode
+from silo.bom.message import message
 from silo.bom.walk.document import LinkProblem
 from silo.fcstd.container import FileStat
 from silo.fcstd.contents import FileContents
@@ -86,7 +87,7 @@ class Library:
         if not self._locator.inside(real):
             raise FcstdError(
                 real,
-                f"it lies outside {self._locator.root}, the folder that may be read",
+                message("it lies outside {root}, the folder that may be read", root=self._locator.root),
                 FindingCode.OUTSIDE_ROOT,
             )
         document = self._document(FoundFile(opened, real))
@@ -153,7 +154,10 @@ class Library:
     def _load(self, location: FoundFile) -> FcstdDocument | FcstdError:
         if len(self.documents) >= self.limits.documents:
             return FcstdError(
-                location.real, f"more than {self.limits.documents} files are not read in one go"
+                location.real,
+                message(
+                    "more than {documents} files are not read in one go", documents=self.limits.documents
+                ),
             )
         if facts := self._facts(location.real):
             return FcstdDocument(self, location, self._contents.remembered(location.real, facts))
@@ -170,8 +174,14 @@ class Library:
 
     def _note_respelt(self, owner: FcstdDocument, ref: Ref, location: FoundFile) -> None:
         name = os.path.basename(location.real)
-        differs = "which differs in case or Unicode form only"
-        note = f"{owner.FileName} records {ref.file}; taken was {name}, {differs}"
+        differs = message("which differs in case or Unicode form only")
+        note = message(
+            "{filename} records {file}; taken was {name}, {differs}",
+            filename=owner.FileName,
+            file=ref.file,
+            name=name,
+            differs=differs,
+        )
         if note not in self.notes:
             self.notes.append(note)
 

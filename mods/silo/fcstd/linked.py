@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from silo.bom.errors import DocumentError
+from silo.bom.message import message
 from silo.bom.walk.links import file_item
 from silo.checksums import content_hash
 from silo.fcstd.container import ContainerFile, document_xml
@@ -59,7 +60,7 @@ def recorded_paths(path: Path | str) -> tuple[str, ...]:
         tags = start_tags(as_utf8(text), limits.depth, TAGS)
         paths = {attributes.get("file", "").replace("\\", "/"): None for _, attributes in tags}
     except Malformed as error:
-        raise DocumentError(name, f"its Document.xml {error}") from error
+        raise DocumentError(name, message("its Document.xml {error}", error=error)) from error
     return tuple(path for path in paths if path)
 
 

@@ -13,6 +13,7 @@ from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.errors import DocumentError
+from silo.bom.message import message
 from silo.bom.walk.document import LinkProblem as Problem
 from silo.fcstd.properties import Properties
 from silo.fcstd.type_tree import ancestors, is_listed
@@ -113,7 +114,14 @@ class FcstdObject:
     def getPropertyByName(self, name: str) -> Any:
         """Return the value of a property. AttributeError if there is none, or none that is plain."""
         if name not in self.properties.numbers:  # a plain attribute, such as Name, is no property
-            raise AttributeError(f"{self.TypeId} {self.Name} has no property {name!r}")
+            raise AttributeError(
+                message(
+                    "{typeid} {name} has no property {name2}",
+                    typeid=self.TypeId,
+                    name=self.Name,
+                    name2=repr(name),
+                )
+            )
         return getattr(self, name)
 
     def __getattr__(self, name: str) -> Any:
@@ -176,7 +184,12 @@ class FcstdObject:
         self.Document.was_read(self, properties.size)
 
     def __repr__(self) -> str:
-        return f"<{self.TypeId} {self.Name} of {self.Document.FileName}>"
+        return message(
+            "<{typeid} {name} of {filename}>",
+            typeid=self.TypeId,
+            name=self.Name,
+            filename=self.Document.FileName,
+        )
 
     def _value(self, name: str, piece: bytes) -> Any:
         values = self.Document.values
@@ -184,7 +197,14 @@ class FcstdObject:
             return value
         raw = self.properties.value(name)
         if raw is ABSENT or not isinstance(raw, _KINDS.get(name, object)):
-            raise AttributeError(f"{name}: {self.TypeId} {self.Name} has no such property with a plain value")
+            raise AttributeError(
+                message(
+                    "{name}: {typeid} {name2} has no such property with a plain value",
+                    name=name,
+                    typeid=self.TypeId,
+                    name2=self.Name,
+                )
+            )
         value = self._resolved(raw)
         if len(piece) <= _REMEMBER_AT_MOST:
             values[piece] = value

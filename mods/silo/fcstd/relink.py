@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from silo.bom.errors import DocumentError, InputError, listed
+from silo.bom.message import message
 from silo.fcstd.container import ContainerFile, document_xml
 from silo.fcstd.edit import check_writable, edited_xml, in_attribute, replace_file
 from silo.fcstd.expat_reader import Malformed, as_utf8, start_tags
@@ -78,7 +79,7 @@ def _look(path: str, old: str, limits: Limits) -> Relinked | None:
     try:
         records = list(_records(text, path, old, limits))
     except Malformed as error:
-        raise DocumentError(path, f"its Document.xml {error}") from error
+        raise DocumentError(path, message("its Document.xml {error}", error=error)) from error
     if not records:
         return None
     return Relinked(path, len(records), tuple(sorted({record.name for record in records if record.name})))
@@ -87,7 +88,7 @@ def _look(path: str, old: str, limits: Limits) -> Relinked | None:
 def _records(text: bytes, path: str, file: str, limits: Limits) -> Iterator[_Record]:
     """Yield the elements that record a link to ``file``, as seen from the document at ``path``."""
     if as_utf8(text) is not text:
-        raise Malformed("is not in UTF-8")
+        raise Malformed(message("is not in UTF-8"))
     folder, wanted = os.path.dirname(path), {file, os.path.realpath(file)}
     for at, attributes in start_tags(text, limits.depth, TAGS):
         recorded = attributes.get("file", "")
@@ -107,10 +108,15 @@ def _check_target(relinked_files: list[Relinked], old: str, target: str, limits:
         lacking = [name for name in wanted if document.getObject(name) is None]
     if lacking:
         raise InputError(
-            f"{target} does not hold what the links to {old} want: {listed(lacking)}; nothing was changed"
+            message(
+                "{target} does not hold what the links to {old} want: {lacking}; nothing was changed",
+                target=target,
+                old=old,
+                lacking=listed(lacking),
+            )
         )
     if any(file.path == target for file in relinked_files):
-        raise InputError(f"{target} would link to itself; nothing was changed")
+        raise InputError(message("{target} would link to itself; nothing was changed", target=target))
 
 
 def _mend(relinked: Relinked, old: str, target: str, limits: Limits) -> None:
@@ -121,7 +127,7 @@ def _mend(relinked: Relinked, old: str, target: str, limits: Limits) -> None:
         for record in _records(text, relinked.path, old, limits):
             attribute = _FILE.search(text, record.at)
             if attribute is None:
-                raise Malformed("has a link that cannot be edited")
+                raise Malformed(message("has a link that cannot be edited"))
             parts += [text[begin : attribute.end(1)], b'"%b"' % in_attribute(recorded).encode()]
             begin = attribute.end()
         return b"".join((*parts, text[begin:]))
@@ -149,4 +155,6 @@ def read_back(relinked: Relinked, copy: str, old: str, target: str, before: int)
     left = sum(1 for _ in _records(text, copy, old, limits))
     now = sum(1 for _ in _records(text, copy, target, limits))
     if left or now != before + relinked.links:
-        raise DocumentError(relinked.path, "the mended copy does not hold the new links; nothing was written")
+        raise DocumentError(
+            relinked.path, message("the mended copy does not hold the new links; nothing was written")
+        )

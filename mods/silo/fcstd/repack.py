@@ -6,6 +6,7 @@ from __future__ import annotations
 import zlib
 from typing import NamedTuple
 
+from silo.bom.message import message
 from silo.fcstd.container import CENTRAL, END, LOCAL, ContainerFile, Directory, ZipEntry
 from silo.fcstd.errors import FcstdError
 
@@ -35,7 +36,7 @@ def replaced_entry(container: ContainerFile, entry: ZipEntry, content: bytes) ->
     # Up to the next entry: header, data, a data descriptor if there is one, and any padding.
     end = min((e.offset for e in entries if e.offset > begin), default=container.directory.offset)
     if end < container.data_offset(entry) + entry.packed:
-        raise FcstdError(container.path, "it is damaged: its entries overlap")
+        raise FcstdError(container.path, message("it is damaged: its entries overlap"))
     local, packed = _local(container, entry, content)
     growth = len(local) - (end - begin)
     before, after = KeptBytes(0, begin), KeptBytes(end, container.directory.offset - end)
@@ -43,7 +44,7 @@ def replaced_entry(container: ContainerFile, entry: ZipEntry, content: bytes) ->
     tail = _end(container.directory, growth)
     size = before.length + len(local) + after.length + len(directory) + len(tail)
     if size > _LARGEST:
-        raise FcstdError(container.path, "it is too large for a plain zip container")
+        raise FcstdError(container.path, message("it is too large for a plain zip container"))
     return before, local, after, directory, tail
 
 

@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from silo.bom.errors import DocumentError
+from silo.bom.message import message
 from silo.bom.walk.document import own
 from silo.bom.walk.identity import META_KEY, meta_key, own_identity
 from silo.fcstd import expat_reader
@@ -106,7 +107,9 @@ def unstamp(
         with Library(limits=limits) as library:
             obj = library.open(real).getObject(object_name)
             if obj is None:
-                raise DocumentError(real, f"it holds no object named {object_name!r}")
+                raise DocumentError(
+                    real, message("it holds no object named {object_name}", object_name=repr(object_name))
+                )
             if own_identity(obj) is None and (own(obj, "SiloBomExclude") is True) == no_part:
                 return False
         check_writable(real)
@@ -122,9 +125,11 @@ def unstamp(
         with Library() as library:
             read = library.open(copy).getObject(object_name)
             if read is None or own_identity(read) is not None:
-                raise DocumentError(real, "the copy still holds the identity; the file is unchanged")
+                raise DocumentError(real, message("the copy still holds the identity; the file is unchanged"))
             if (own(read, "SiloBomExclude") is True) != no_part:
-                raise DocumentError(real, "the copy does not have the mark as wanted; the file is unchanged")
+                raise DocumentError(
+                    real, message("the copy does not have the mark as wanted; the file is unchanged")
+                )
 
     replace_file(real, state, content, check)
     return True
@@ -134,7 +139,12 @@ def _check_identity(path: str, identity: str) -> None:
     odd = any(unicodedata.category(c) in ("Cc", "Cs", "Cn") or c in "\ufffe\uffff" for c in identity)
     if not identity.strip() or identity != identity.strip() or len(identity) > _LONGEST or odd:
         raise DocumentError(
-            path, f"{identity!r} is not an identity: wanted one line of 1 to {_LONGEST} characters"
+            path,
+            message(
+                "{identity} is not an identity: wanted one line of 1 to {longest} characters",
+                identity=repr(identity),
+                longest=_LONGEST,
+            ),
         )
 
 
@@ -156,20 +166,26 @@ def _present(
         for wanted in dict.fromkeys(filter(None, (object_name, item_object))):
             obj = document.getObject(wanted)
             if obj is None:
-                raise DocumentError(path, f"it holds no object named {wanted!r}")
+                raise DocumentError(path, message("it holds no object named {wanted}", wanted=repr(wanted)))
             places += [(obj, "SiloItemId"), (obj, "SiloUUID")]
         # A property of its own goes before Meta, so Meta would have no effect beside another one.
         others = {name: own for owner, name in places if (own := _text_of(owner, name))}
         others = {name: own for name, own in others.items() if own.lower() != identity.lower()}
         for name, own in others.items() if not replace else ():
-            raise DocumentError(path, f"its own property {name} is another identity already: {own}")
+            raise DocumentError(
+                path,
+                message("its own property {name} is another identity already: {own}", name=name, own=own),
+            )
         item = document.getObject(item_object) if item_object else None
         named = item is None or bool(_text_of(item, "SiloItemId"))
         present = document.Meta.get(meta_key(object_name or ""), "").strip()
     same = present.lower() == identity.lower()
     if present and not same and not replace:
         what = META_KEY if object_name is None else f"{META_KEY} of {object_name}"
-        raise DocumentError(path, f"it carries another identity already ({what}): {present}")
+        raise DocumentError(
+            path,
+            message("it carries another identity already ({what}): {present}", what=what, present=present),
+        )
     return same and named and not others
 
 
@@ -197,10 +213,14 @@ def _read_back(path: str, temporary: str, key: str, identity: str) -> None:
         with Library() as library:
             read = library.open(temporary).Meta.get(key)
     except DocumentError as error:
-        reason = f"the stamped copy cannot be read ({error.reason}); the file is unchanged"
+        reason = message(
+            "the stamped copy cannot be read ({reason}); the file is unchanged", reason=error.reason
+        )
         raise DocumentError(path, reason) from error
     if read != identity:
-        raise DocumentError(path, "the stamped copy does not hold the identity; the file is unchanged")
+        raise DocumentError(
+            path, message("the stamped copy does not hold the identity; the file is unchanged")
+        )
 
 
 # As FreeCAD writes what the add-on adds: asks for no recompute (8), and cannot be edited by accident.
@@ -229,10 +249,10 @@ def _edited(
     edited.
     """
     if expat_reader.as_utf8(text) is not text:
-        raise Malformed("is not in UTF-8")
+        raise Malformed(message("is not in UTF-8"))
     head, data = expat_reader.index_document(text, depth_limit)
     if head.properties is None:
-        raise Malformed("has no document properties")
+        raise Malformed(message("has no document properties"))
     edits: list[tuple[Span, Callable[[bytes], bytes]]]
     edits = [
         (
@@ -242,7 +262,7 @@ def _edited(
     ]
     if object_name is not None:
         if object_name not in data:
-            raise Malformed(f"has no data of the object {object_name!r}")
+            raise Malformed(message("has no data of the object {object_name}", object_name=repr(object_name)))
         edits.append((data[object_name], lambda element: _with_all(element, properties, depth_limit)))
     for (begin, end), edit in sorted(edits, key=lambda change: change[0], reverse=True):
         text = text[:begin] + edit(text[begin:end]) + text[end:]
@@ -278,7 +298,7 @@ def _with_property(element: bytes, name: str, prop: bytes | None, indent: bytes,
     # The start of the list is directly before the first property.
     start = element.rfind(b"<Properties", 0, min((span[0] for span in spans.values()), default=len(element)))
     if start < 0:
-        raise Malformed("has an object without properties")
+        raise Malformed(message("has an object without properties"))
     tag = _start_tag(element[start:])
     step = 1 if here is None else -1
     counted = _COUNT.sub(lambda match: match[1] + b"%d" % (int(match[2]) + step) + match[3], tag, count=1)
@@ -304,7 +324,7 @@ def _start_tag(element: bytes) -> bytes:
     """Return the first tag; its quotes may hold a ``>``."""
     match = re.match(rb"""<(?:[^<>"']|"[^"]*"|'[^']*')*>""", element)
     if match is None:
-        raise Malformed("has a property that cannot be edited")
+        raise Malformed(message("has a property that cannot be edited"))
     return match[0]
 
 

@@ -19,6 +19,7 @@ from pathlib import Path
 from silo.bom.entry import Extraction, walk_entries
 from silo.bom.errors import DocumentError
 from silo.bom.findings import Finding, FindingCode
+from silo.bom.message import Message, message, template
 from silo.bom.walk.identity import identity_of
 from silo.fcstd.document import FcstdDocument
 from silo.fcstd.library import Library
@@ -28,7 +29,7 @@ from silo.proposed_command import proposed
 # A project has some hundreds of files; a home folder taken for one would have many more.
 _MOST_FILES = 2000
 _MOST_FOLDERS = 5000
-_DID_YOU_MEAN = " Did you mean"
+_SUGGESTION = template("{found} Did you mean {file} ({why})? {command} mends the links.")
 _CODES = (FindingCode.MISSING_FILE, FindingCode.MISSING_OBJECT)
 
 # (file, object) → the Silo UUID that it had in the last sync.
@@ -67,11 +68,11 @@ def _with_suggestion(
     file, why = meant[finding.file]
     holder = finding.where[0].doc_path if finding.where else extraction.assembly.doc_path
     command = proposed("relink", Path(holder), "--from", Path(finding.file), "--to", Path(file))
-    message = (
-        f"{finding.message.partition(_DID_YOU_MEAN)[0]}{_DID_YOU_MEAN} {file} ({why})? "
-        f"{command} mends the links."
-    )
-    return replace(finding, message=message, did_you_mean=file)
+    found = finding.message
+    if isinstance(found, Message) and found.template == _SUGGESTION:
+        found = found.values["found"]
+    text = Message(_SUGGESTION, {"found": found, "file": file, "why": why, "command": command})
+    return replace(finding, message=text, did_you_mean=file)
 
 
 def _lost(extraction: Extraction) -> dict[str, _Lost]:
@@ -118,8 +119,11 @@ class _Project:
         """Find the file that was meant, and why; None unless exactly one file fits."""
         holding = [path for path in self._files if path != lost.file and self._holds(path, lost.objects)]
         rules: list[tuple[str, list[str]]] = [
-            ("it carries the Silo identity", [path for path in holding if self._identified(path, lost)]),
-            ("a file of this name", [path for path in holding if _same_name(path, lost.file)]),
+            (
+                message("it carries the Silo identity"),
+                [path for path in holding if self._identified(path, lost)],
+            ),
+            (message("a file of this name"), [path for path in holding if _same_name(path, lost.file)]),
         ]
         for why, fitting in rules:
             # Copies of one file share its identity; their names may still distinguish them.

@@ -19,6 +19,7 @@ from itertools import accumulate, compress, count, islice, repeat
 from operator import lshift, not_, or_
 from typing import TYPE_CHECKING, Any
 
+from silo.bom.message import message
 from silo.fcstd.container import Inflater, ZipEntry
 from silo.fcstd.errors import FcstdError
 from silo.fcstd.expat_reader import Head, Malformed, Span, as_utf8, index_document
@@ -162,7 +163,7 @@ class XmlText:
 
     def error(self, reason: str) -> FcstdError:
         """Make an error about this text."""
-        return FcstdError(self.path, f"its Document.xml {reason}")
+        return FcstdError(self.path, message("its Document.xml {reason}", reason=reason))
 
     def malformed(self, problem: Malformed) -> FcstdError:
         """Make an error about a piece of this text; prefers expat's words about the whole, which name the
@@ -182,7 +183,7 @@ class XmlText:
         try:
             return raw.decode()
         except UnicodeDecodeError as error:
-            raise self.error("is not in UTF-8") from error
+            raise self.error(message("is not in UTF-8")) from error
 
     def _settle(self, quick: Callable[[], None]) -> None:
         """Try the quick way, then the careful one. What failed once fails again without being read again."""
@@ -257,7 +258,13 @@ class XmlText:
 
     def _limit_objects(self, count: int) -> None:
         if count > self.limits.objects:
-            raise self.error(f"lists {count} objects; at most {self.limits.objects} are read")
+            raise self.error(
+                message(
+                    "lists {count} objects; at most {objects} are read",
+                    count=count,
+                    objects=self.limits.objects,
+                )
+            )
 
     def _index_objects(self, until: str | None = None) -> None:
         """Index the objects from where the last run stopped, up to the named one or to the end."""
@@ -364,7 +371,9 @@ class XmlText:
             raise self.error(str(error)) from error
         self._limit_objects(len(head.types))
         if lost := [name for name in head.types if name not in data]:
-            raise self.error(f"lists the object {lost[0]!r} but does not hold its data")
+            raise self.error(
+                message("lists the object {lost} but does not hold its data", lost=repr(lost[0]))
+            )
         self._head = head
         self._data = {name: begin << _HALF | end for name, (begin, end) in data.items()}
         self._hold(text)

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from silo.bom.errors import counted, listed
+from silo.bom.message import message
 from silo.workbook.sheet import Grid, SheetRow
 
 _NUMBER = re.compile(r"[\s+\-−~(]{0,40}[\d.,]")
@@ -43,7 +44,9 @@ def as_shown(records: Sequence[SheetRow], grid: Grid, header: SheetRow, used: Se
         cell = facts.get((top, column))
         if cell is None or bottom == top:
             continue
-        what = f"“{cell.text.strip()}” in lines {top + 1} to {bottom + 1}"
+        what = message(
+            "“{text}” in lines {top} to {bottom}", text=cell.text.strip(), top=top + 1, bottom=bottom + 1
+        )
         if _NUMBER.match(cell.text):
             numbers.append(what)
             continue
@@ -59,7 +62,10 @@ def as_shown(records: Sequence[SheetRow], grid: Grid, header: SheetRow, used: Se
     struck = sorted({row for (row, _), cell in facts.items() if cell.struck})
     uncalculated = sum(cell.uncalculated for cell in grid.cells.values())
     hidden_columns = [header.cells[column].strip() for column in used if column in grid.hidden_columns]
-    under = [f"“{facts[place].text.strip()}” in line {place[0] + 1}" for place in covered]
+    under = [
+        message("“{text}” in line {place}", text=facts[place].text.strip(), place=place[0] + 1)
+        for place in covered
+    ]
     like_others = "in the workbook; {} read like all others"
     notes = {
         f"{counted(uncalculated, 'formula')} without a value; "
@@ -81,9 +87,17 @@ def as_shown(records: Sequence[SheetRow], grid: Grid, header: SheetRow, used: Se
 
 def _lines(rows: Sequence[int], text: str = "is", many: str = "are") -> str:
     numbers = listed([str(row + 1) for row in rows], 8)
-    return f"lines {numbers} {many}" if len(rows) > 1 else f"line {numbers} {text}"
+    return (
+        message("lines {numbers} {many}", numbers=numbers, many=many)
+        if len(rows) > 1
+        else message("line {numbers} {text}", numbers=numbers, text=text)
+    )
 
 
 def _columns(names: Sequence[str]) -> str:
     shown = listed([f"“{name}”" for name in names], 8)
-    return f"the columns {shown} are" if len(names) > 1 else f"the column {shown} is"
+    return (
+        message("the columns {shown} are", shown=shown)
+        if len(names) > 1
+        else message("the column {shown} is", shown=shown)
+    )

@@ -15,6 +15,7 @@ from decimal import Decimal
 
 from silo.bom.errors import InputError
 from silo.bom.headers import Heading, designators, normal
+from silo.bom.message import joined, message
 from silo.bom.numbers import Mark, whole_number
 from silo.bom.quantities import LARGEST_QUANTITY
 from silo.bom.units import PIECES, unit_of
@@ -60,7 +61,7 @@ BOM = TableKind(
 LINE_KINDS = ("component", "alternate", "reference")
 _RANGE = re.compile(r"([A-Za-z]{1,20})([0-9]{1,9})-([A-Za-z]{0,20})([0-9]{1,9})")
 # Columns of our own exports.
-_INCOMPLETE, _SOURCE, _TOTAL = "Incomplete", "Source", "Total quantity"
+_INCOMPLETE, _SOURCE, _TOTAL = "Incomplete", "Source", message("Total quantity")
 # Headings that number the lines of a file, and are no find numbers.
 _COUNTERS = frozenset(("index", "row", "line", "nr", "no", "lfd nr", "item", "item no", "序号", "番号"))
 
@@ -123,7 +124,13 @@ def bom_rows(sheet: Sheet, mark: Mark | None = None) -> BomRows:
         quantity, unit = _quantity(row, quantities, texts, problems)
         unit = unit or (heading_unit if not texts.get(Heading.UNIT) else "")
         if unit and texts.get(Heading.UNIT) and unit_of(unit) != unit_of(texts[Heading.UNIT]):
-            problems.append(f"Quantity: is in {unit}, and the unit is {texts[Heading.UNIT]!r}")
+            problems.append(
+                message(
+                    "Quantity: is in {unit}, and the unit is {unit1}",
+                    unit=unit,
+                    unit1=repr(texts[Heading.UNIT]),
+                )
+            )
         if unit:
             texts[Heading.UNIT] = unit
         doubt = _doubt(quantity, texts) if Heading.QUANTITY in at else ""
@@ -150,22 +157,33 @@ def refuse_clashes(sheet: Sheet, kind: TableKind) -> None:
     seconds = [(role, index) for role, index in sheet.columns.others if role in kind.single]
     cells = [row.cells for row in sheet.rows]
     problems = [
-        f"the columns '{clash.ours}' and '{clash.other}' both mean the {clash.role.replace('_', ' ')}, and "
-        f"in row {sheet.rows[clash.row].line} they say {clash.used[:40]!r} and {clash.unused[:40]!r}"
+        message(
+            "the columns '{ours}' and '{other}' both mean the {role}, and in row {line} they say "
+            "{used} and {unused}",
+            ours=clash.ours,
+            other=clash.other,
+            role=clash.role.replace("_", " "),
+            line=sheet.rows[clash.row].line,
+            used=repr(clash.used[:40]),
+            unused=repr(clash.unused[:40]),
+        )
         for clash in find_clashes(sheet.header, cells, sheet.columns.at, seconds)
     ]
     if problems:
-        raise InputError(f"file: {'; '.join(problems)}; choose one, or rename the other", problems)
+        raise InputError(
+            message("file: {problems}; choose one, or rename the other", problems=joined("; ", problems)),
+            problems,
+        )
 
 
 def _no_line(row: SheetRow, at: Mapping[str, int], gap: int | None) -> str:
     """Say why a row is no line of the BOM; "" if it is one."""
     if not any(cell_at(row.cells, index) for index in at.values()):
-        return "no cell in a column that is used"
+        return message("no cell in a column that is used")
     if is_total([cell_at(row.cells, at.get(role)) for role in NAMING], row.cells):
-        return "a sum, no part"
+        return message("a sum, no part")
     if cell_at(row.cells, gap) and not cell_at(row.cells, at.get(Heading.PART_NUMBER)):
-        return f"what the export left out: {cell_at(row.cells, gap)[:80]}"
+        return message("what the export left out: {gap}", gap=cell_at(row.cells, gap)[:80])
     return ""
 
 
@@ -178,8 +196,10 @@ def _refuse_flat(sheet: Sheet) -> None:
     lines = [row.cells for row in sheet.rows if cell_at(row.cells, number)]
     if lines and not any(cell_at(cells, titles.index(_SOURCE)) for cells in lines):
         raise InputError(
-            "file: this is a flat export, whose quantities are totals over all levels, not the lines of this "
-            "BOM. Export “these lines” instead, change them, and import that"
+            message(
+                "file: this is a flat export, whose quantities are totals over all levels, not the lines "
+                "of this BOM. Export “these lines” instead, change them, and import that"
+            )
         )
 
 
@@ -244,13 +264,17 @@ def _not_fitted(
         title, text = sheet.header[at[role]].strip(), texts[role]
         if not text and role is Heading.FITTED:
             if not empty_is_fitted:
-                problems.append(f"{title}: is empty here and says yes elsewhere; write yes or no")
+                problems.append(
+                    message("{title}: is empty here and says yes elsewhere; write yes or no", title=title)
+                )
             continue
         fitted = is_fitted(text, by_absence=role is Heading.NOT_FITTED)
         if fitted is None:
-            problems.append(f"{title}: wanted yes or no, got {text[:40]!r}")
+            problems.append(
+                message("{title}: wanted yes or no, got {text}", title=title, text=repr(text[:40]))
+            )
         elif not fitted:
-            return f"not fitted: {title} is {text[:40]!r}"
+            return message("not fitted: {title} is {text}", title=title, text=repr(text[:40]))
     return ""
 
 
@@ -260,16 +284,20 @@ def _quantity(
     if quantities.index is None:
         count = count_designators(texts.get(Heading.REFERENCE_DESIGNATORS, ""))
         if not count:
-            problems.append("Quantity: there is no column of quantities, and the row has no designators")
+            problems.append(
+                message("Quantity: there is no column of quantities, and the row has no designators")
+            )
         return Decimal(count) or None, ""
     amount = quantities.read(row)
     text = texts[Heading.QUANTITY][:40]
     if amount.value is None:
-        problems.append(f"Quantity: {amount.problem}")
+        problems.append(message("Quantity: {problem}", problem=amount.problem))
     elif amount.currency:
-        problems.append(f"Quantity: wanted a number such as 4 or 2.5, got {text!r}")
+        problems.append(message("Quantity: wanted a number such as 4 or 2.5, got {text}", text=repr(text)))
     elif not 0 < amount.value <= Decimal(LARGEST_QUANTITY):
-        problems.append(f"Quantity: wanted a number above 0 and at most 1e9, got {text!r}")
+        problems.append(
+            message("Quantity: wanted a number above 0 and at most 1e9, got {text}", text=repr(text))
+        )
     else:
         return amount.value, amount.unit
     return None, ""
@@ -279,4 +307,8 @@ def _doubt(quantity: Decimal | None, texts: Mapping[str, str]) -> str:
     named = count_designators(texts.get(Heading.REFERENCE_DESIGNATORS, ""))
     if quantity is None or not named or quantity == named or unit_of(texts.get(Heading.UNIT)) != PIECES:
         return ""
-    return f"Quantity: is {quantity:f}, and the reference designators name {named}"
+    return message(
+        "Quantity: is {quantity}, and the reference designators name {named}",
+        quantity=f"{quantity:f}",
+        named=named,
+    )

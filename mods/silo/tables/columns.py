@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from silo.bom.errors import InputError
 from silo.bom.headers import Heading, normal, plain_cell
+from silo.bom.message import message
 from silo.tables.heading_detail import PriceHeading, price_heading
 from silo.tables.kind import TableKind
 
@@ -65,7 +66,11 @@ def find_columns(header: Sequence[str], kind: TableKind, assigned: Assigned | No
     unknown = sorted((assigned or {}).keys() - {*kind.roles})
     if unknown:
         raise InputError(
-            f"unknown column role {', '.join(unknown)}; the roles are {', '.join(sorted(kind.roles))}"
+            message(
+                "unknown column role {unknown}; the roles are {roles}",
+                unknown=", ".join(unknown),
+                roles=", ".join(sorted(kind.roles)),
+            )
         )
     plain = [normal(cell) for cell in header]
     at: dict[str, int] = {}

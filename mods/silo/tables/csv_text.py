@@ -11,6 +11,7 @@ import io
 from collections.abc import Iterator, Sequence
 
 from silo.bom.errors import InputError
+from silo.bom.message import message
 from silo.tables import limits
 from silo.workbook.encoding import unicode_name
 from silo.workbook.sheet import SheetRow
@@ -29,7 +30,14 @@ def decodings(
         try:
             yield encoding, data.decode(encoding)
         except (UnicodeDecodeError, LookupError) as error:
-            raise InputError(f"{source}: cannot be read as {encoding}: {error}") from error
+            raise InputError(
+                message(
+                    "{source}: cannot be read as {encoding}: {error}",
+                    source=source,
+                    encoding=encoding,
+                    error=error,
+                )
+            ) from error
         return
     if name := unicode_name(data):
         # Bytes that are no text are kept in the name of a file, which only UTF-8 can; else they are marked.
@@ -57,8 +65,13 @@ def read_records(text: str, delimiter: str, source: str) -> list[SheetRow]:
         for row in _records(text, delimiter):
             if len(row.cells) > limits.MOST_COLUMNS:
                 raise InputError(
-                    f"{source}: line {row.line} has {len(row.cells)} cells; a table has at most "
-                    f"{limits.MOST_COLUMNS} columns"
+                    message(
+                        "{source}: line {line} has {count} cells; a table has at most {most_columns} columns",
+                        source=source,
+                        line=row.line,
+                        count=len(row.cells),
+                        most_columns=limits.MOST_COLUMNS,
+                    )
                 )
             account.take_objects()
             account.take_cells(len(row.cells))
@@ -68,8 +81,13 @@ def read_records(text: str, delimiter: str, source: str) -> list[SheetRow]:
             line = row.line + sum(cell.count("\n") for cell in row.cells) + 1
     except csv.Error as error:
         raise InputError(
-            f"{source}: the row of line {line} cannot be read as CSV: its quotes do not match, so the rows "
-            f"from there on may be wrong or missing ({error})"
+            message(
+                "{source}: the row of line {line} cannot be read as CSV: its quotes do not match, so the "
+                "rows from there on may be wrong or missing ({error})",
+                source=source,
+                line=line,
+                error=error,
+            )
         ) from None
     return rows
 

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from silo.bom.headers import Heading
+from silo.bom.message import message
 from silo.tables.bom_rows import refuse_clashes
 from silo.tables.columns import cell_at
 from silo.tables.kind import TableKind
@@ -69,17 +70,19 @@ def part_rows(sheet: Sheet) -> PartRows:
     for row in sheet.rows:
         texts = {role: cell_at(row.cells, index) for role, index in at.items()}
         if not any(texts.values()):
-            rows.append(PartRow(row.line, texts, left_out="no cell in a column that is used"))
+            rows.append(PartRow(row.line, texts, left_out=message("no cell in a column that is used")))
             continue
         if is_total([texts.get(role, "") for role in (*PARTS.naming, Heading.DESCRIPTION)], row.cells):
-            rows.append(PartRow(row.line, texts, left_out="a sum, no part"))
+            rows.append(PartRow(row.line, texts, left_out=message("a sum, no part")))
             continue
         problems = []
         if said := texts.get(Heading.SOURCING):
             sourcing = read_sourcing(said)
             texts[Heading.SOURCING] = sourcing
             if not sourcing:
-                problems.append(f"Sourcing: wanted purchased or manufactured, got {said[:40]!r}")
+                problems.append(
+                    message("Sourcing: wanted purchased or manufactured, got {said}", said=repr(said[:40]))
+                )
         rows.append(PartRow(row.line, texts, tuple(problems)))
     return PartRows(tuple(rows), tuple(sheet.unused), sheet.notes)
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 
 from silo.bom.headers import Heading
+from silo.bom.message import message
 from silo.bom.numbers import Mark, parse_number
 from silo.bom.units import UnitKind, known_unit
 from silo.tables.bom_rows import refuse_clashes
@@ -91,7 +92,7 @@ def price_rows(sheet: Sheet, mark: Mark | None = None) -> PriceRows:
     rows = []
     for row in sheet.rows:
         if is_total([cell_at(row.cells, at[Heading.PART_NUMBER])], row.cells):
-            rows.append(PriceRow(row.line, {}, left_out="a sum, no part"))
+            rows.append(PriceRow(row.line, {}, left_out=message("a sum, no part")))
             continue
         problems: list[str] = []
         texts = {role: cell_at(row.cells, index) for role, index in at.items() if role != Heading.PRICE}
@@ -107,12 +108,20 @@ def price_rows(sheet: Sheet, mark: Mark | None = None) -> PriceRows:
             if lone and head.bare:
                 least = f"{head.least:f}"
                 problems.append(
-                    f"Price: “{title}” can be the price of {least} or the price of one from {least} on; "
-                    f"write “Price per {least}” or “Price from {least}”"
+                    message(
+                        "Price: “{title}” can be the price of {least} or the price of one from {least} on; "
+                        "write “Price per {least}” or “Price from {least}”",
+                        title=title,
+                        least=least,
+                    )
                 )
                 continue
             if head.strange and not sheet.columns.chosen:
-                problems.append(f"Price: “{title}” has the unknown word “{head.strange}”")
+                problems.append(
+                    message(
+                        "Price: “{title}” has the unknown word “{strange}”", title=title, strange=head.strange
+                    )
+                )
             given += _prices(row, head, numeral, texts, numerals[Heading.PRICE_BASIS], problems)
         rows.append(PriceRow(row.line, texts, tuple(given), tuple(problems)))
     return PriceRows(tuple(rows), tuple(sheet.unused), sheet.notes)
@@ -121,8 +130,8 @@ def price_rows(sheet: Sheet, mark: Mark | None = None) -> PriceRows:
 def _plain(role: str, numerals: Numerals, row: SheetRow, texts: dict[str, str], problems: list[str]) -> None:
     amount = numerals.read(row)
     if amount.value is None or amount.currency:
-        words = amount.problem or f"wanted a number, got {texts[role][:40]!r}"
-        problems.append(f"{role.replace('_', ' ').capitalize()}: {words}")
+        words = amount.problem or message("wanted a number, got {role}", role=repr(texts[role][:40]))
+        problems.append(message("{role}: {words}", role=role.replace("_", " ").capitalize(), words=words))
     else:
         texts[role] = f"{amount.value:f}"
 
@@ -134,7 +143,7 @@ def _days(sheet: Sheet, texts: dict[str, str], problems: list[str]) -> None:
     title = sheet.header[sheet.columns.at[Heading.LEAD_TIME]]
     days = days_of_heading(title)
     if days is None:
-        problems.append(f"Lead time: “{title.strip()}” is neither in days nor in weeks")
+        problems.append(message("Lead time: “{title}” is neither in days nor in weeks", title=title.strip()))
     elif days != 1 and text.isascii() and text.isdigit() and len(text) < 6:
         texts[Heading.LEAD_TIME] = str(int(text) * days)
 
@@ -160,15 +169,15 @@ def _prices(
         if colon:
             quantity = numeral.read_text(least_text)
             if quantity.value is None:
-                problems.append(f"Price: {quantity.problem}")
+                problems.append(message("Price: {problem}", problem=quantity.problem))
                 continue
             least = quantity.value
         if price.value is None:
-            problems.append(f"Price: {price.problem}")
+            problems.append(message("Price: {problem}", problem=price.problem))
             continue
         _currency(head, price.currency, texts, problems)
         if price.unit:
-            problems.append(f"Price: wanted a price, got {written[:40]!r}")
+            problems.append(message("Price: wanted a price, got {written}", written=repr(written[:40])))
         found.append((least, _divided(price.value, per)))
     return found
 
@@ -178,12 +187,16 @@ def _basis(
 ) -> Decimal:
     """Return for how many pieces a price is."""
     if head.per_unit is not None:
-        problems.append(f"Price: is the price of 1 {head.per_unit.symbol}; wanted the price of pieces")
+        problems.append(
+            message(
+                "Price: is the price of 1 {symbol}; wanted the price of pieces", symbol=head.per_unit.symbol
+            )
+        )
     per = head.per
     if head.per_pack:
         pack = parse_number(texts.get(Heading.PACK_SIZE, ""))
         if pack is None or pack.exact <= 0:
-            problems.append("Price: is the price of a pack, and the row has no pack size")
+            problems.append(message("Price: is the price of a pack, and the row has no pack size"))
         else:
             per = pack.exact
     text = texts.get(Heading.PRICE_BASIS, "")
@@ -195,7 +208,9 @@ def _basis(
     if unit is not None and unit.kind is UnitKind.PIECES:
         return per
     if amount.value is None or amount.value <= 0 or amount.unit or amount.currency or per != 1:
-        problems.append(f"Price basis: wanted a number of pieces such as 100, got {text[:40]!r}")
+        problems.append(
+            message("Price basis: wanted a number of pieces such as 100, got {text}", text=repr(text[:40]))
+        )
         return per
     return amount.value
 
@@ -205,7 +220,7 @@ def _currency(head: PriceHeading, in_cell: str, texts: dict[str, str], problems:
     own = texts.get(Heading.CURRENCY, "")
     said = {code for code in (currency_of_word(own) or own.upper(), head.currency, in_cell) if code}
     if len(said) > 1:
-        problems.append(f"Currency: the row says {' and '.join(sorted(said))[:60]}")
+        problems.append(message("Currency: the row says {said}", said=" and ".join(sorted(said))[:60]))
     elif said:
         texts[Heading.CURRENCY] = said.pop()
 

@@ -15,6 +15,7 @@ from itertools import zip_longest
 
 from silo.bom.errors import InputError, counted
 from silo.bom.headers import Heading, missing_columns
+from silo.bom.message import Message, joined, message
 from silo.bom.numbers import Mark, parse_number
 from silo.tables import limits
 from silo.tables.as_shown import as_shown
@@ -62,7 +63,7 @@ class Sheet:
         unused = []
         for index in sorted(filled - used):
             title = self.header[index].strip() if index < len(self.header) else ""
-            unused.append(title or f"column {index + 1}, which has no heading")
+            unused.append(title or message("column {index}, which has no heading", index=index + 1))
         return unused
 
 
@@ -114,14 +115,16 @@ def read_sheet(
     """
     limits.TABLE.account(source).take_bytes(len(data))
     if delimiter is not None and len(delimiter) != 1:
-        raise InputError(f"a delimiter is one character, got “{delimiter}”")
+        raise InputError(message("a delimiter is one character, got “{delimiter}”", delimiter=delimiter))
     if data.startswith(STARTS):
         return _from_workbook(data, source, kind, columns, layout, continues)
     first_lines: list[str] = []
     near = ""
     for name, text in decodings(data, encoding, source, kind.code_pages):
         if text.lstrip()[:1] == "<":
-            raise InputError(f"{source}: this is HTML or XML and no table; export it as CSV or XLSX")
+            raise InputError(
+                message("{source}: this is HTML or XML and no table; export it as CSV or XLSX", source=source)
+            )
         first_lines = first_lines or text.splitlines()
         if layout is not None:
             records = read_records(text, layout.delimiter, source)
@@ -133,14 +136,17 @@ def read_sheet(
                 near = near or _near(tables, kind)
                 continue
             best, records = found, read_records(text, found.delimiter, source)
-        notes = []
+        notes: list[str] = []
         if name in kind.code_pages and not data.isascii():
             notes.append(
-                f"the file is not UTF-8; it was read as {name}. If names look wrong, "
-                "export it as UTF-8 or say which encoding it has"
+                message(
+                    "the file is not UTF-8; it was read as {name}. If names look wrong, export it as UTF-8 "
+                    "or say which encoding it has",
+                    name=name,
+                )
             )
         return _sheet(records, best, kind, columns, notes, source, continues)
-    raise InputError(f"{source}: {near or _no_header(first_lines, kind)}")
+    raise InputError(message("{source}: {kind}", source=source, kind=near or _no_header(first_lines, kind)))
 
 
 def _from_workbook(
@@ -159,18 +165,26 @@ def _from_workbook(
     ]
     if layout is not None:
         if not sheets:
-            raise InputError(f"{source}: wanted a workbook with a table, got one without a sheet")
+            raise InputError(
+                message("{source}: wanted a workbook with a table, got one without a sheet", source=source)
+            )
         grid, rows = usable[0][:2] if usable else sheets[0]
         usable = [(grid, rows, _chosen(rows, kind, layout, source)), *usable[1:]]
     if not usable:
         near = _near([("", rows[: limits.HEADER_WITHIN]) for _, rows in sheets], kind)
         lines = [", ".join(row.cells) for _, rows in sheets for row in rows]
-        raise InputError(f"{source}: {near or _no_header(lines, kind)}")
-    notes = []
+        raise InputError(message("{source}: {kind}", source=source, kind=near or _no_header(lines, kind)))
+    notes: list[str] = []
     sheets_read = tuple(grid.name for grid, _, _ in usable) if usable[1:] else ()
     if sheets_read:
-        others = ", ".join(f"sheet “{name}”" for name in sheets_read[1:])
-        notes = [f"sheet “{usable[0][0].name}” of the workbook was read; not read: {others}"]
+        others = joined(", ", (message("sheet “{name}”", name=name) for name in sheets_read[1:]))
+        notes = [
+            message(
+                "sheet “{name}” of the workbook was read; not read: {others}",
+                name=usable[0][0].name,
+                others=others,
+            )
+        ]
     grid, rows, best = usable[0]
     return _sheet(rows, best, kind, columns, notes, source, continues, grid, sheets_read)
 
@@ -179,8 +193,8 @@ def _chosen(records: Sequence[SheetRow], kind: TableKind, layout: Layout, source
     header = records[layout.header] if layout.header < len(records) else SheetRow(1, ())
     columns = find_columns(header.cells, kind, layout.columns)
     if missing := kind.lacking(columns.at.keys() | {*kind.instead.get(kind.naming[0], ())} & _named(columns)):
-        words = ", ".join(role.replace("_", " ").capitalize() for role in missing)
-        raise InputError(f"{source}: choose the column of {words}")
+        words = joined(", ", map(_title, missing))
+        raise InputError(message("{source}: choose the column of {words}", source=source, words=words))
     return _Header(layout.delimiter, layout.header, 1, header, columns)
 
 
@@ -214,7 +228,13 @@ def _sheet(
         columns, first = find_columns(header.cells, kind, given), first + 1
     seen = ", ".join(cell.strip() for cell in header.cells if cell.strip())
     notes += [
-        f"there is no column “{text}” for {role} in line {header.line} ({seen})"
+        message(
+            "there is no column “{text}” for {role} in line {line} ({seen})",
+            text=text,
+            role=role,
+            line=header.line,
+            seen=seen,
+        )
         for role, text in (given or {}).items()
         if role not in columns.at
     ]
@@ -240,11 +260,16 @@ def _refuse_long(rows: Sequence[SheetRow], width: int, source: str) -> None:
     long = [row for row in rows if any(cell.strip() for cell in row.cells[width:])]
     if long:
         problems = [
-            f"line {row.line}: wanted {counted(width, 'cell')} as in the heading, got "
-            f"{counted(len(row.cells), 'cell')}; a comma or semicolon without quotes shifts the columns"
+            message(
+                "line {line}: wanted {width} as in the heading, got {cells}; a comma or semicolon "
+                "without quotes shifts the columns",
+                line=row.line,
+                width=counted(width, "cell"),
+                cells=counted(len(row.cells), "cell"),
+            )
             for row in long
         ]
-        raise InputError(f"{source}: {problems[0]}", problems)
+        raise InputError(message("{source}: {problems}", source=source, problems=problems[0]), problems)
 
 
 def _is_second_line(header: SheetRow, columns: Columns, below: SheetRow, kind: TableKind) -> bool:
@@ -271,7 +296,11 @@ def _joined(header: SheetRow, below: SheetRow, *, brackets: bool) -> SheetRow:
     filled = [next(filter(None, reversed(header.cells[: i + 1])), "") for i in range(len(header.cells))]
     filled += [filled[-1] if filled else ""] * (len(below.cells) - len(filled))
     cells = [
-        (f"{above} ({under.strip(_BRACKETS)})" if brackets else f"{above} {under}".strip())
+        (
+            message("{above} ({brackets})", above=above, brackets=under.strip(_BRACKETS))
+            if brackets
+            else f"{above} {under}".strip()
+        )
         if under.strip()
         else own
         for above, own, under in zip_longest(filled, header.cells, below.cells, fillvalue="")
@@ -321,6 +350,10 @@ def _two_lines(
     return (SheetRow(header.line, tuple(alone)), columns) if is_more and kind.complete(columns.at) else None
 
 
+def _title(role: str) -> Message:
+    return Message(role.replace("_", " ").capitalize())
+
+
 def _near(tables: Iterable[tuple[str, Sequence[SheetRow]]], kind: TableKind) -> str:
     """Say which needed column a line lacks that has another needed one; "" if no line does."""
     for _, rows in tables:
@@ -329,23 +362,38 @@ def _near(tables: Iterable[tuple[str, Sequence[SheetRow]]], kind: TableKind) -> 
             if len(row.cells) > 1 and {*kind.needed} & at.keys():
                 lacking = kind.lacking(at)
                 if not {*lacking} <= {*Heading}:
-                    return f"in line {row.line}, there is no column {', '.join(lacking)}"
+                    return message(
+                        "in line {line}, there is no column {lacking}",
+                        line=row.line,
+                        lacking=joined(", ", map(Message, lacking)),
+                    )
                 known = {Heading(role): place for role, place in at.items()}
                 missing = missing_columns(row.cells, known, [Heading(role) for role in lacking])
-                return f"in line {row.line}, {missing}"
+                return message("in line {line}, {missing}", line=row.line, missing=missing)
     return ""
 
 
 def _no_header(text: Sequence[str], kind: TableKind) -> str:
     lines = [line.strip() for line in text if line.strip()][:3]
-    needed = ", ".join(role.replace("_", " ").capitalize() for role in kind.needed)
-    wanted = f"header line with {needed}" if needed else "header line with a column of names or part numbers"
+    needed = joined(", ", map(_title, kind.needed))
+    wanted = (
+        message("header line with {needed}", needed=needed)
+        if needed
+        else message("header line with a column of names or part numbers")
+    )
     if not lines:
-        return f"the file is empty; wanted a {wanted}, and rows"
+        return message("the file is empty; wanted a {wanted}, and rows", wanted=wanted)
     seen = "; ".join(f"“{line[:80]}”" for line in lines)
-    words = f"found no {wanted} among the first {limits.HEADER_WITHIN} lines. The file begins with {seen}"
+    words = message(
+        "found no {wanted} among the first {header_within} lines. The file begins with {seen}",
+        wanted=wanted,
+        header_within=limits.HEADER_WITHIN,
+        seen=seen,
+    )
     if kind.any_name:
-        words += ". Name the columns yourself, for example: --column name=Bauteil --column mass=Gewicht"
+        words += message(
+            ". Name the columns yourself, for example: --column name=Bauteil --column mass=Gewicht"
+        )
     return words
 
 

@@ -13,6 +13,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
+from silo.bom.message import message
+
 _DOTTED = re.compile(r"\d{1,6}(?:[.,]\d{1,6}){1,30}")
 _POSITION = re.compile(r"\d{1,6}(?:\.\d{1,6}){0,30}")
 _LEVEL = re.compile(r"[\s.+>·_|\-]{0,60}(\d{1,3})(?:[.,]0{1,3})?[\s.]{0,60}")
@@ -77,11 +79,13 @@ def by_positions(positions: Sequence[str]) -> RowTree:
         parent = seen.get(head) if head else None
         parents.append(parent)
         if head and parent is None:
-            problems[index] = f"the position {text} has no row {head} above it"
+            problems[index] = message("the position {text} has no row {head} above it", text=text, head=head)
         elif text and text in seen:
-            problems[index] = f"the position {text} stands here twice; a spreadsheet makes 1.1 of 1.10"
+            problems[index] = message(
+                "the position {text} stands here twice; a spreadsheet makes 1.1 of 1.10", text=text
+            )
         elif not text:
-            problems[index] = "the row has no position number that can be read"
+            problems[index] = message("the row has no position number that can be read")
         if text:
             seen[text] = index
     return RowTree(tuple(parents), "position", problems)
@@ -97,12 +101,19 @@ def by_levels(levels: Sequence[int | None]) -> RowTree:
     for index, value in enumerate(levels):
         here = top if value is None else value
         if value is None:
-            problems[index] = "the row has no level that can be read"
+            problems[index] = message("the row has no level that can be read")
         while stack and stack[-1][0] >= here:
             stack.pop()
         above = stack[-1][0] if stack else top - 1
         if here > above + 1:
-            problems.setdefault(index, f"the level {here} follows on {above if stack else 'no row'}")
+            problems.setdefault(
+                index,
+                message(
+                    "the level {here} follows on {above}",
+                    here=here,
+                    above=above if stack else message("no row"),
+                ),
+            )
         parents.append(stack[-1][1] if stack else None)
         stack.append((here, index))
     return RowTree(tuple(parents), "level", problems)

@@ -17,6 +17,7 @@ from silo.bom.compare.states import ComparedAssembly
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import InputError, SiloError
 from silo.bom.findings import Finding, Severity
+from silo.bom.message import altered
 from silo.bom.view.folders import shorten
 from silo.bom.walk.document import relative
 from silo.bom.walk.links import extract
@@ -109,7 +110,7 @@ def _without(message: str, base: str, root: Path | str | None) -> str:
     message = shorten(message, base)
     if root is None or (top := os.path.realpath(root)) == base:
         return message
-    return message.replace(top + os.sep, f"{relative(top, base)}/")
+    return altered(message, lambda text: text.replace(top + os.sep, f"{relative(top, base)}/"))
 
 
 def _users_first(paths: Sequence[str], library: Library) -> list[str]:

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from xml.etree.ElementTree import Element, fromstring
 
 from silo.bom.errors import InputError
+from silo.bom.message import message
 from silo.workbook.encoding import STARTS
 from silo.workbook.limits import MAX_UNPACKED
 from silo.workbook.ods import read_ods
@@ -26,12 +27,18 @@ def read_workbook(data: bytes, source: str) -> list[Grid]:
     try:
         grids = list(read_xls(data) if data.startswith(STARTS[1]) else _zipped(data))
     except InputError as error:
-        raise InputError(f"{source}: {error}") from error
+        raise InputError(message("{source}: {error}", source=source, error=error)) from error
     except ImportError as error:
-        raise InputError(f"{source}: this is a workbook; export it as CSV, or install xlrd") from error
+        raise InputError(
+            message("{source}: this is a workbook; export it as CSV, or install xlrd", source=source)
+        ) from error
     except Exception as error:  # any error that a broken file causes in a reader
         raise InputError(
-            f"{source}: the workbook cannot be read ({error or type(error).__name__})"
+            message(
+                "{source}: the workbook cannot be read ({name})",
+                source=source,
+                name=error or type(error).__name__,
+            )
         ) from error
     return sorted(grids, key=lambda grid: not grid.visible)
 
@@ -39,7 +46,12 @@ def read_workbook(data: bytes, source: str) -> list[Grid]:
 def _zipped(data: bytes) -> Iterator[Grid]:
     archive = zipfile.ZipFile(io.BytesIO(data))
     if sum(info.file_size for info in archive.infolist()) > MAX_UNPACKED:
-        raise InputError(f"unpacked, the workbook is larger than {MAX_UNPACKED / 1e6:.0f} MB")
+        raise InputError(
+            message(
+                "unpacked, the workbook is larger than {max_unpacked} MB",
+                max_unpacked=f"{MAX_UNPACKED / 1000000.0:.0f}",
+            )
+        )
     parts = {info.filename.replace("\\", "/").casefold(): info for info in archive.infolist()}
 
     def read(path: str) -> Element:
@@ -47,7 +59,9 @@ def _zipped(data: bytes) -> Iterator[Grid]:
         content = archive.read(part) if part is not None else b"<none/>"
         # No workbook has a document type. Without one there are no entities, which could grow without end.
         if b"<!DOCTYPE" in content or b"\0" in content[:64]:
-            raise InputError(f"its {path} has a document type or is not UTF-8; save the workbook again")
+            raise InputError(
+                message("its {path} has a document type or is not UTF-8; save the workbook again", path=path)
+            )
         return fromstring(content)  # noqa: S314 - see above
 
     return read_ods(read) if "content.xml" in parts else read_xlsx(read)

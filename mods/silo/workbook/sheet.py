@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from silo.bom.errors import InputError
+from silo.bom.message import message
 from silo.workbook import limits
 
 
@@ -63,7 +64,11 @@ class Grid:
             self.cells[row, column] = cell._replace(text=" ".join(cell.text.splitlines()))
             if len(self.cells) > limits.MOST_CELLS:
                 raise InputError(
-                    f"sheet “{self.name}” has more than {limits.MOST_CELLS} cells, too many for a BOM"
+                    message(
+                        "sheet “{name}” has more than {most_cells} cells, too many for a BOM",
+                        name=self.name,
+                        most_cells=limits.MOST_CELLS,
+                    )
                 )
 
     def covered(self) -> set[tuple[int, int]]:
@@ -74,7 +79,7 @@ class Grid:
             size = (bottom - top + 1) * (right - left + 1)
             effort += min(size, len(self.cells))
             if effort > 10 * limits.MOST_CELLS:
-                raise InputError(f"sheet “{self.name}” has merged cells that overlap")
+                raise InputError(message("sheet “{name}” has merged cells that overlap", name=self.name))
             inside = ((row, column) for row in range(top, bottom + 1) for column in range(left, right + 1))
             for row, column in inside if size < len(self.cells) else self.cells:
                 if top <= row <= bottom and left <= column <= right and (row, column) != (top, left):
@@ -92,7 +97,9 @@ class Grid:
                 if cell.number:
                     numbers.setdefault(row, set()).add(column)
         if sum(map(max, by_row.values())) > 10 * limits.MOST_CELLS:
-            raise InputError(f"sheet “{self.name}” is too wide; delete the cells outside of the table")
+            raise InputError(
+                message("sheet “{name}” is too wide; delete the cells outside of the table", name=self.name)
+            )
         return [
             SheetRow(
                 row + 1,

@@ -8,6 +8,7 @@ import struct
 from collections.abc import Iterator
 
 from silo.bom.errors import InputError
+from silo.bom.message import message
 from silo.workbook.number_format import START, START_1904, formatted
 from silo.workbook.sheet import Cell, Grid
 
@@ -24,7 +25,7 @@ def read_xls(data: bytes) -> Iterator[Grid]:
         while entry.tot_size < container.min_size_std_stream and 0 <= sector < len(container.SSAT):
             sector, steps = container.SSAT[sector], steps + 1
             if steps > len(container.SSAT):
-                raise InputError("the workbook is damaged: its sectors form a circle")
+                raise InputError(message("the workbook is damaged: its sectors form a circle"))
     book = xlrd.open_workbook(
         file_contents=data, formatting_info=True, on_demand=True, ragged_rows=True, logfile=log
     )

@@ -11,6 +11,7 @@ from functools import reduce
 from xml.etree.ElementTree import Element
 
 from silo.bom.errors import InputError
+from silo.bom.message import message
 from silo.workbook.number_format import BOOLEANS, START, START_1904, formatted, iso_text
 from silo.workbook.parts import CellStyle, ReadPart
 from silo.workbook.sheet import Cell, Grid
@@ -20,7 +21,7 @@ def read_xlsx(read: ReadPart) -> Iterator[Grid]:
     """Read every sheet that has cells; charts have none."""
     path = _links(read, "").get("officeDocument", "xl/workbook.xml")
     if path.endswith(".bin"):
-        raise InputError("this is a binary workbook (XLSB); save it as XLSX")
+        raise InputError(message("this is a binary workbook (XLSB); save it as XLSX"))
     links, book = _links(read, path), read(path)
     strings = [_string(item) for item in read(links.get("sharedStrings", "")).iterfind("{*}si")]
     styles = list(_xlsx_styles(read(links.get("styles", "")))) or [("", False)]
@@ -99,7 +100,9 @@ def _place(reference: str) -> tuple[int, int]:
     """Return row and column of a cell such as "D3"."""
     match = re.fullmatch("([A-Z]{1,3})([1-9][0-9]{0,6})", reference.upper())
     if match is None:
-        raise InputError(f"a cell stands at “{reference[:20]}”, which no sheet has")
+        raise InputError(
+            message("a cell stands at “{reference}”, which no sheet has", reference=reference[:20])
+        )
     return int(match[2]) - 1, reduce(lambda number, letter: number * 26 + ord(letter) - 64, match[1], 0) - 1
 
 

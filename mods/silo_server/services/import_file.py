@@ -9,6 +9,7 @@ would wait for.
 from __future__ import annotations
 
 from silo.bom.errors import InputError, RejectedError, listed
+from silo.bom.message import message
 from silo.budget import OverBudgetError
 from silo.tables.kind import TableKind
 from silo.tables.sheet import Layout, Sheet, read_sheet
@@ -34,7 +35,7 @@ def read_import(data: bytes, kind: TableKind, max_rows: int, layout: Layout | No
 
 def _read(data: bytes, kind: TableKind, layout: Layout | None) -> Sheet:
     try:
-        return read_sheet(data, "file", kind, layout=layout)
+        return read_sheet(data, message("file"), kind, layout=layout)
     except OverBudgetError as error:
         raise TooLargeError(str(error)) from None
     except InputError as error:

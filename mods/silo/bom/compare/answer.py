@@ -11,6 +11,7 @@ from typing import Any
 from urllib.parse import quote
 
 from silo.bom.compare.bom_diff import BomChange, BomDiff, QuantityChange
+from silo.bom.message import joined, message
 from silo.bom.quantities import plain
 
 
@@ -19,14 +20,14 @@ def summary(diff: BomDiff) -> str:
     unreferenced``.
     """
     parts = [
-        f"{len(diff.added)} added",
-        f"{len(diff.quantity_changed)} quantity changed",
-        f"{len(diff.removed)} unreferenced",
+        message("{count} added", count=len(diff.added)),
+        message("{count} quantity changed", count=len(diff.quantity_changed)),
+        message("{count} unreferenced", count=len(diff.removed)),
     ]
     if diff.conflicts:
-        parts.append(f"{len(diff.conflicts)} in conflict")
-    words = ", ".join(parts)
-    return f"BOM updated: {words}"
+        parts.append(message("{count} in conflict", count=len(diff.conflicts)))
+    words = joined(", ", parts)
+    return message("BOM updated: {words}", words=words)
 
 
 def resolve_url(part_number: str) -> str:
@@ -49,7 +50,7 @@ def answer_of(
         {
             "type": "unreferenced",
             "part_number": change.part_number,
-            "message": "Present in server BOM but not in assembly",
+            "message": message("Present in server BOM but not in assembly"),
         }
         for change in diff.removed
     ]
@@ -82,7 +83,9 @@ def conflict_warning(change: QuantityChange) -> dict[str, Any]:
     return {
         "type": "conflict",
         "part_number": change.part_number,
-        "message": f"The assembly has {cad}, Silo has {kept} (set by a person); a person decides",
+        "message": message(
+            "The assembly has {cad}, Silo has {kept} (set by a person); a person decides", cad=cad, kept=kept
+        ),
         "assembly_quantity": cad,
         "server_quantity": ours,
     }

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from silo.bom.errors import MissingRevisionError
+from silo.bom.message import message
 
 
 class FileRevision(Protocol):
@@ -50,7 +51,12 @@ def base_revision_of(revision: int | None, sha256: str | None, same: int | None)
         return same
     if sha256 and same is None:
         raise MissingRevisionError(
-            f"revision {revision} with the SHA-256 {sha256[:12]}… is not on this server, so its BOM was not "
-            "merged. The server may have been restored from a backup: send the file again, then its BOM"
+            message(
+                "revision {revision} with the SHA-256 {sha256}… is not on this server, so its BOM was "
+                "not merged. The server may have been restored from a backup: send the file again, then "
+                "its BOM",
+                revision=revision,
+                sha256=sha256[:12],
+            )
         )
     return revision

@@ -10,6 +10,7 @@ from typing import Any
 from silo.bom.entry import BomEntry
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.frozen import freeze
+from silo.bom.message import counted_message, message
 
 
 class Row(Mapping[str, Any]):
@@ -107,19 +108,27 @@ class BomDiff:
         findings = []
         if self.removed:
             count, numbers = len(self.removed), ", ".join(change.part_number for change in self.removed)
-            items = "1 item in the Silo BOM is" if count == 1 else f"{count} items in the Silo BOM are"
-            message = (
-                f"{items} not referenced by components in this assembly. Nothing was deleted: {numbers}."
+            text = counted_message(
+                count,
+                "{n} item in the Silo BOM is not referenced by components in this assembly. "
+                "Nothing was deleted: {numbers}.",
+                "{n} items in the Silo BOM are not referenced by components in this assembly. "
+                "Nothing was deleted: {numbers}.",
+                numbers=numbers,
             )
-            findings.append(Finding(FindingCode.UNREFERENCED, Severity.WARNING, message, places))
+            findings.append(Finding(FindingCode.UNREFERENCED, Severity.WARNING, text, places))
         for change in self.conflicts:
-            kept = "no quantity" if change.remote_quantity is None else f"{change.remote_quantity:g}"
-            kept = change.on_server(kept)
-            message = (
-                f"{change.part_number}: the assembly has {change.local_quantity:g}, a line kept by hand in "
-                f"the Silo BOM has {kept}. It stays as it is until somebody decides."
+            on_server = (
+                message("no quantity") if change.remote_quantity is None else f"{change.remote_quantity:g}"
             )
-            findings.append(Finding(FindingCode.CONFLICT, Severity.WARNING, message, places))
+            text = message(
+                "{part_number}: the assembly has {local_quantity}, a line kept by hand in the Silo BOM has "
+                "{kept}. It stays as it is until somebody decides.",
+                part_number=change.part_number,
+                local_quantity=f"{change.local_quantity:g}",
+                kept=change.on_server(on_server),
+            )
+            findings.append(Finding(FindingCode.CONFLICT, Severity.WARNING, text, places))
         return tuple(findings)
 
 

@@ -13,12 +13,13 @@ from dataclasses import dataclass
 from silo.bom.entry import BomEntry
 from silo.bom.items.standard_kind import OTHER_NAMES, standard_kind
 from silo.bom.items.stems import stems
+from silo.bom.message import message
 
 SURE = 0.5
 """From this confidence on, a category is proposed without a question."""
 
 # Categories for standard parts of any kind.
-_STANDARD_WORDS = ("fastener", "hardware", "standard part", "purchased", "bought")
+_STANDARD_WORDS = ("fastener", "hardware", message("standard part"), "purchased", "bought")
 
 # In the order of preference, for components whose name fits no category.
 _PART_WORDS = ("part", "machin", "custom", "manufactur", "component", "mechanic")

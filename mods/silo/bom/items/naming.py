@@ -7,6 +7,7 @@ import os.path
 import re
 
 from silo.bom.entry import BomEntry
+from silo.bom.message import message
 from silo.bom.text import clean_name
 
 # Labels that FreeCAD or an import gives by itself say nothing of the part.
@@ -36,7 +37,7 @@ def proposed_name(entry: BomEntry, *, shares_file: bool = False) -> str:
     chosen = of_document not in ("", stem)
     if of_object and not _GENERIC.match(of_object) and (shares_file or not chosen):
         return of_object
-    return of_document or of_object or "Unnamed component"
+    return of_document or of_object or message("Unnamed component")
 
 
 def display_name(entry: BomEntry) -> str:

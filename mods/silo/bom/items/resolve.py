@@ -6,7 +6,6 @@ Pure but for the look-up. Entries of one part number become one line; what has n
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
@@ -14,6 +13,7 @@ from silo.bom.entry import BomEntry, walk_entries
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.items.lookup import ItemLookup, Known, look_up
 from silo.bom.items.naming import display_name
+from silo.bom.message import altered, message
 
 
 def resolve_part_numbers(
@@ -71,11 +71,11 @@ def numbered_findings(findings: Iterable[Finding], items: Known) -> tuple[Findin
     numbers = {uuid.lower(): str(item.get("part_number") or uuid) for uuid, item in items.items() if item}
     codes = (FindingCode.COPIED_IDENTITY, FindingCode.SHARED_IDENTITY)
 
-    def numbered(message: str) -> str:
-        return re.sub(r"(?<=\()[^()]+(?=\): )", lambda uuid: numbers.get(uuid[0], uuid[0]), message)
+    def numbered(value: str) -> str:
+        return numbers.get(value.lower(), value)
 
     return tuple(
-        replace(finding, message=numbered(finding.message)) if finding.code in codes else finding
+        replace(finding, message=altered(finding.message, numbered)) if finding.code in codes else finding
         for finding in findings
     )
 
@@ -114,8 +114,10 @@ def unregistered_findings(unresolved: Iterable[BomEntry]) -> tuple[Finding, ...]
         Finding(
             FindingCode.UNREGISTERED,
             Severity.WARNING,
-            f"{display_name(entry) or entry.object_name} has no Silo part number and is left out of the BOM "
-            "until it is registered.",
+            message(
+                "{object_name} has no Silo part number and is left out of the BOM until it is registered.",
+                object_name=display_name(entry) or entry.object_name,
+            ),
             (Place(entry.doc_path, entry.object_name),),
         )
         for entry in unresolved

@@ -10,6 +10,7 @@ from typing import Any
 
 from silo.bom.errors import InputError
 from silo.bom.items.stems import stem
+from silo.bom.message import message
 
 
 @dataclass(frozen=True)
@@ -24,12 +25,18 @@ class CategoryRule:
     def read(cls, raw: object) -> CategoryRule:
         """Read a rule from TOML or JSON: ``{words = ["motor", "frame"], category = "M06"}``. InputError."""
         if not isinstance(raw, Mapping):
-            raise InputError(f"category rule: wanted a table with words and category, got {raw!r}")
+            raise InputError(
+                message("category rule: wanted a table with words and category, got {raw}", raw=repr(raw))
+            )
         if unknown := sorted(set(raw) - {"category", "words", "without"}):
-            raise InputError(f"category rule: unknown keys: {', '.join(map(str, unknown))}")
+            raise InputError(
+                message("category rule: unknown keys: {unknown}", unknown=", ".join(map(str, unknown)))
+            )
         category, words = raw.get("category"), _texts(raw, "words")
         if not isinstance(category, str) or not category or not words:
-            raise InputError(f"category rule: wanted words and a category, got {dict(raw)!r}")
+            raise InputError(
+                message("category rule: wanted words and a category, got {raw}", raw=repr(dict(raw)))
+            )
         return cls(category, words, _texts(raw, "without"))
 
     def fits(self, words: frozenset[str]) -> bool:
@@ -40,7 +47,9 @@ class CategoryRule:
 def _texts(raw: Mapping[str, object], key: str) -> frozenset[str]:
     value = raw.get(key, [])
     if not isinstance(value, list) or not all(isinstance(word, str) and word for word in value):
-        raise InputError(f"category rule: {key} must be a list of words, got {value!r}")
+        raise InputError(
+            message("category rule: {key} must be a list of words, got {value}", key=key, value=repr(value))
+        )
     return frozenset(stem(word) for word in value)
 
 

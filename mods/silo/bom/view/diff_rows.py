@@ -8,6 +8,7 @@ from dataclasses import fields
 from typing import Any
 
 from silo.bom.compare.bom_diff import BomDiff, rows_as_dicts
+from silo.bom.message import message
 
 
 def diff_json(diff: BomDiff) -> dict[str, Any]:
@@ -29,7 +30,11 @@ def diff_rows(diff: BomDiff) -> Iterator[tuple[str, str, str]]:
                 quantity = f"{_quantity(change.remote_quantity)} → {_quantity(change.local_quantity)}"
             elif kind == "conflicts":
                 kept = change.on_server(_quantity(change.remote_quantity))
-                quantity = f"CAD {_quantity(change.local_quantity)}, Silo {kept}"
+                quantity = message(
+                    "CAD {local_quantity}, Silo {kept}",
+                    local_quantity=_quantity(change.local_quantity),
+                    kept=kept,
+                )
             elif kind == "manual" and change.part_number in disputed:
                 continue
             else:

@@ -8,6 +8,7 @@ from types import ModuleType
 
 from silo.bom.commands_in_text import outside_commands
 from silo.bom.entry import Extraction
+from silo.bom.message import altered
 from silo.bom.walk.document import relative
 
 
@@ -36,4 +37,8 @@ def shorten(message: str, base: str) -> str:
     """Cut the folder ``base`` from the paths in a message, but for commands that it proposes."""
     folder = base.rstrip("/\\")
     # The root of the disk cannot be left out: all separators would go.
-    return outside_commands(lambda text: text.replace(folder + os.sep, ""), message) if folder else message
+    if not folder:
+        return message
+    return altered(
+        message, lambda text: outside_commands(lambda part: part.replace(folder + os.sep, ""), text)
+    )

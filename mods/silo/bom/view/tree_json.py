@@ -9,6 +9,7 @@ from typing import Any
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import InputError
 from silo.bom.findings import Finding
+from silo.bom.message import beside, message
 from silo.bom.view.folders import base_folder, shorten
 from silo.bom.walk.document import relative
 
@@ -43,10 +44,12 @@ def finding_json(finding: Finding, base: str) -> dict[str, Any]:
     A broken link also has the ``file`` that it records, and the one that was probably meant, if there is one.
     """
     files = {"file": finding.file, "did_you_mean": finding.did_you_mean}
+    message = shorten(finding.message, base)
     return {
         "code": finding.code.value,
         "severity": finding.severity.value,
-        "message": shorten(finding.message, base),
+        "message": message,
+        **beside(message),
         "where": [{"file": relative(place.doc_path, base), "object": place.obj} for place in finding.where],
         **{key: relative(path, base) for key, path in files.items() if path},
     }
@@ -69,8 +72,13 @@ def check_tree_size(extraction: Extraction, most: int = MOST_LINES) -> None:
     lines = tree_size(extraction.entries)
     if lines > most:
         raise InputError(
-            f"The BOM tree of {extraction.assembly.label} has {lines:,} lines, more than the {most:,} that "
-            "can be shown. Use the flat list (--flat): each component once, with its total."
+            message(
+                "The BOM tree of {label} has {lines} lines, more than the {most} that can be shown. Use "
+                "the flat list (--flat): each component once, with its total.",
+                label=extraction.assembly.label,
+                lines=f"{lines:,}",
+                most=f"{most:,}",
+            )
         )
 
 

@@ -23,6 +23,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from silo.bom.errors import DocumentError
 from silo.bom.findings import FindingCode
+from silo.bom.message import message
 
 
 @runtime_checkable
@@ -146,7 +147,7 @@ def label_of(obj: object) -> str:
             continue
         if isinstance(text, str) and text:
             return text if len(text) <= _LONGEST_LABEL else f"{text[:_LONGEST_LABEL]}…"
-    return "an unnamed object"
+    return message("an unnamed object")
 
 
 def document_property(doc: object, name: str) -> Any:

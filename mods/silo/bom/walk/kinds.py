@@ -12,6 +12,7 @@ from enum import Enum, auto
 from functools import lru_cache
 from typing import Any
 
+from silo.bom.message import message
 from silo.bom.walk.document import derived, first_of, own, property_names
 from silo.bom.walk.standard import fastener_type, is_tool
 
@@ -77,22 +78,22 @@ _GEOMETRY = ("Part::Feature", "Mesh::Feature", "Points::Feature")
 
 # What a link may point at without meaning a component, in words for people. (A binder has a shape.)
 _NO_COMPONENTS = {
-    "Spreadsheet::Sheet": "a spreadsheet",
-    "App::VarSet": "a set of variables",
-    "Part::Part2DObject": "a sketch",
-    "Part::Datum": "a datum",
-    "App::DatumElement": "a datum",
-    "App::LocalCoordinateSystem": "a coordinate system",
-    "App::OriginFeature": "a datum",
-    "App::Origin": "an origin",
-    "App::MaterialObject": "a material",
-    "App::TextDocument": "a text",
-    "App::Annotation": "a note",
-    "App::AnnotationLabel": "a note",
-    "App::ImagePlane": "a picture",
-    "Image::ImagePlane": "a picture",
-    "TechDraw::DrawPage": "a drawing",
-    **dict.fromkeys(_NO_FOLDERS, "a group of joints or views"),
+    "Spreadsheet::Sheet": message("a spreadsheet"),
+    "App::VarSet": message("a set of variables"),
+    "Part::Part2DObject": message("a sketch"),
+    "Part::Datum": message("a datum"),
+    "App::DatumElement": message("a datum"),
+    "App::LocalCoordinateSystem": message("a coordinate system"),
+    "App::OriginFeature": message("a datum"),
+    "App::Origin": message("an origin"),
+    "App::MaterialObject": message("a material"),
+    "App::TextDocument": message("a text"),
+    "App::Annotation": message("a note"),
+    "App::AnnotationLabel": message("a note"),
+    "App::ImagePlane": message("a picture"),
+    "Image::ImagePlane": message("a picture"),
+    "TechDraw::DrawPage": message("a drawing"),
+    **dict.fromkeys(_NO_FOLDERS, message("a group of joints or views")),
 }
 
 
@@ -207,7 +208,7 @@ def no_component(obj: object) -> str:
     ):
         return ""
     if derived(obj, "App::FeaturePython") and (has_own(obj, "JointType") or has_own(obj, "ObjectToGround")):
-        return "a joint"
+        return message("a joint")
     return next((words for name, words in _NO_COMPONENTS.items() if derived(obj, name)), "")
 
 

@@ -25,6 +25,7 @@ from silo.bom.errors import InputError, SeveralAssembliesError, did_you_mean
 from silo.bom.findings import Finding, FindingCode, Place
 from silo.bom.items.naming import display_name
 from silo.bom.key import Key
+from silo.bom.message import joined, message
 from silo.bom.walk.chains import chains
 from silo.bom.walk.contents import Count, Lost
 from silo.bom.walk.document import NAMELESS, label_of, own
@@ -183,12 +184,24 @@ def why(
         total += count.quantity
         for way in chains(count, contents.tree):
             steps = [f"{label_of(obj)} × {times}" if times > 1 else label_of(obj) for obj, times in way]
-            lines.append(" → ".join(["beside the assembly"] * count.beside + steps))
+            lines.append(joined(" → ", [*[message("beside the assembly")] * count.beside, *steps]))
     if not lines:
-        wanted = next((piece for piece in parts if isinstance(piece, str)), "This line")
+        wanted = next((piece for piece in parts if isinstance(piece, str)), message("This line"))
         meant_by = did_you_mean(wanted, sorted(all_names - {""})) or "."
-        raise InputError(f"{wanted!r} is not a part of {label_of(assembly_obj)} itself{meant_by}")
-    return [f"{total} × {part} in {label_of(assembly_obj)}:", *lines]
+        raise InputError(
+            message(
+                "{wanted} is not a part of {assembly_obj} itself{meant_by}",
+                wanted=repr(wanted),
+                assembly_obj=label_of(assembly_obj),
+                meant_by=meant_by,
+            )
+        )
+    return [
+        message(
+            "{total} × {part} in {assembly_obj}:", total=total, part=part, assembly_obj=label_of(assembly_obj)
+        ),
+        *lines,
+    ]
 
 
 def same_articles_of(entries: Iterable[BomEntry]) -> list[tuple[BomEntry, BomEntry]]:

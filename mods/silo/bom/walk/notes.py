@@ -13,7 +13,7 @@ from typing import Any
 from silo.bom.entry import BomEntry
 from silo.bom.errors import DocumentError, listed
 from silo.bom.findings import Finding, FindingCode, Place, Severity
-from silo.bom.message import counted_message
+from silo.bom.message import Message, counted_message, joined, message, template
 from silo.bom.walk.document import DocumentRoot, LinkProblem, label_of, object_name, saved_by
 from silo.bom.walk.seen import is_said_to_count
 
@@ -50,11 +50,12 @@ class _Note:
 
     def finding(self, code: FindingCode) -> Finding:
         where = sorted(self.users)
-        message = self.message
+        text = self.message
         if self.tail:
             names = listed(list(dict.fromkeys(self.users[place] for place in where)), 8)
-            message = f"{message}; {self.tail.format(users=names)}."
-        return Finding(code, self.severity, message, tuple(where), self.file)
+            tail = Message(self.tail, {"users": names})
+            text = message("{text}; {tail}.", text=text, tail=tail)
+        return Finding(code, self.severity, text, tuple(where), self.file)
 
 
 class Notes:
@@ -103,9 +104,11 @@ class Notes:
             name: value if isinstance(value, (str, int)) else label_of(value)
             for name, value in values.items()
         }
-        message = (sentence or code.sentence).format(obj=label_of(obj), **named)
+        text = Message(sentence or code.sentence, {"obj": label_of(obj), **named})
+        if named.get("detail"):
+            text = message("{text} ({detail})", text=text, detail=named["detail"])
         place = self.place(obj)
-        made = _Note(severity or code.severity, message, code.tail if tail is None else tail)
+        made = _Note(severity or code.severity, text, code.tail if tail is None else tail)
         note = self._notes.setdefault((code, str(place) if about is None else about), made)
         note.users.setdefault(place, label_of(obj))
         return note
@@ -116,9 +119,9 @@ class Notes:
         code = problem.code if problem.code in _OF_LINKS else FindingCode.BROKEN_LINK
         text = code.sentence
         if code is FindingCode.BROKEN_LINK and problem.file:
-            text = "{file} was not loaded"
+            text = template("{file} was not loaded")
         elif code is FindingCode.CYCLE:
-            text = "A chain of links leads back to itself"
+            text = template(message("A chain of links leads back to itself"))
         about = problem.file or str(self.place(link))
         if code in _BY_OBJECT:
             about = f"{about}#{problem.obj}"
@@ -126,10 +129,10 @@ class Notes:
             code,
             link,
             about,
-            sentence=f"{text} ({{detail}})" if problem.detail else text,
-            tail="used by {users}" if code is FindingCode.CYCLE else None,
-            file=problem.file or "the file",
-            part=problem.obj or "that it is asked for",
+            sentence=text,
+            tail=template("used by {users}") if code is FindingCode.CYCLE else None,
+            file=problem.file or message("the file"),
+            part=problem.obj or message("that it is asked for"),
             detail=problem.detail,
         )
         if code not in (FindingCode.UNSET_LINK, FindingCode.DELETED_COPY):
@@ -137,7 +140,10 @@ class Notes:
 
     def unreadable(self, obj: Any, error: DocumentError) -> None:
         """Report that the file of ``obj`` is damaged at exactly this place."""
-        text, tail = "The file {file} cannot be read in full ({reason})", "not counted: {users}"
+        text, tail = (
+            template("The file {file} cannot be read in full ({reason})"),
+            template("not counted: {users}"),
+        )
         self.add(
             FindingCode.UNREADABLE_FILE,
             obj,
@@ -154,7 +160,8 @@ class Notes:
         self.add(FindingCode.CYCLE, link, path, path=path)
 
     def loop(self, obj: Any) -> None:
-        text, tail = "{file} holds links that lead back to what holds them", "the ring goes through {users}"
+        text = template("{file} holds links that lead back to what holds them")
+        tail = template("the ring goes through {users}")
         file = self._path_of(obj)
         self.add(FindingCode.CYCLE, obj, file, sentence=text, tail=tail, file=file or label_of(obj))
 
@@ -166,7 +173,7 @@ class Notes:
         """
         code = FindingCode.IN_DOCUMENT_LINK
         if leads_back:
-            text = "{obj} links to {target} in this same file: what holds it, and brings nothing."
+            text = template("{obj} links to {target} in this same file: what holds it, and brings nothing.")
             self.add(code, link, severity=Severity.WARNING, sentence=text, tail="", target=target)
         else:
             self.add(code, link, self._path_of(link))
@@ -176,7 +183,11 @@ class Notes:
         places = {Place(*(entry.doc_path, entry.object_name)): entry.label for entry in (bom_entry, other)}
         self._notes[FindingCode.SAME_ARTICLE, f"{bom_entry.standard} {other.standard}"] = _Note(
             FindingCode.SAME_ARTICLE.severity,
-            f"{bom_entry.standard} and {other.standard} are the same article under two standards: two lines.",
+            message(
+                "{standard} and {standard1} are the same article under two standards: two lines.",
+                standard=bom_entry.standard,
+                standard1=other.standard,
+            ),
             users=places,
         )
 
@@ -195,9 +206,9 @@ class Notes:
             self.add(FindingCode.NEWER_FREECAD, root, "", version=texts[0], newest=texts[1])
 
     def stale(self, link: Any, target: Any, gone: Sequence[str], new: Sequence[str]) -> None:
-        parts = [f"no longer there: {listed(gone, 8)}"] if gone else []
-        parts += [f"not shown: {listed(new, 8)}"] if new else []
-        self.add(FindingCode.STALE_ASSEMBLY_LINK, link, target=target, parts="; ".join(parts))
+        parts = [message("no longer there: {gone}", gone=listed(gone, 8))] if gone else []
+        parts += [message("not shown: {new}", new=listed(new, 8))] if new else []
+        self.add(FindingCode.STALE_ASSEMBLY_LINK, link, target=target, parts=joined("; ", parts))
 
     def own_parts(self, container: Any, lines: Sequence[BomEntry]) -> None:
         """Report, once per assembly, the parts of its own file that it shows and that are no items yet."""
@@ -206,7 +217,9 @@ class Notes:
         self.add(
             FindingCode.LOCAL_GEOMETRY,
             container,
-            what="1 own part is no item" if len(lines) == 1 else f"{len(lines)} own parts are not items",
+            what=message("1 own part is no item")
+            if len(lines) == 1
+            else message("{count} own parts are not items", count=len(lines)),
             links=sum(line.quantity for line in lines),
             names=listed(sorted(entry.label for entry in lines), 8),
         )
@@ -228,20 +241,20 @@ class Notes:
             ),
         )
         parts = [
-            f"{words}: {listed(list(map(label_of, objects)), len(objects))}"
+            message("{words}: {names}", words=words, names=", ".join(map(label_of, objects)))
             for objects, words in groups
             if objects
         ]
         if not parts:
             return
         severity = Severity.WARNING if any(not is_said_to_count(obj) for obj in not_counted) else None
-        note = self.add(FindingCode.HIDDEN, container, what="; ".join(parts), severity=severity)
+        note = self.add(FindingCode.HIDDEN, container, what=joined("; ", parts), severity=severity)
         note.users.clear()
         for obj in (*counted, *not_counted, *references):
             note.users.setdefault(self.place(obj), label_of(obj))
 
     def empty(self, head: BomEntry) -> None:
-        text = FindingCode.EMPTY_BOM.sentence.format(obj=head.label)
+        text = Message(FindingCode.EMPTY_BOM.sentence, {"obj": head.label})
         place = Place(head.doc_path, head.object_name)
         note = _Note(FindingCode.EMPTY_BOM.severity, text, users={place: head.label})
         self._notes[FindingCode.EMPTY_BOM, ""] = note
@@ -253,7 +266,12 @@ class Notes:
             the assembly holds no components at all, so it may be the wrong one.
         """
         code = FindingCode.BESIDE_ASSEMBLY
-        more = ", which holds none; move them into it, or name the right assembly" if empty else ""
+        text = template(
+            message(
+                "Components lie in the document itself, beside the assembly, which holds none; "
+                "move them into it, or name the right assembly"
+            )
+        )
         for obj in objects:
             severity = Severity.ERROR if empty else None
-            self.add(code, obj, "", severity=severity, sentence=code.sentence + more)
+            self.add(code, obj, "", severity=severity, sentence=text if empty else code.sentence)

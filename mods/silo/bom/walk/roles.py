@@ -30,6 +30,7 @@ from typing import Any
 from silo.bom.errors import DocumentError, listed
 from silo.bom.findings import FindingCode
 from silo.bom.key import Key
+from silo.bom.message import message
 from silo.bom.walk.arrays import draft_count, draft_elements, elements, is_array, left_out_by
 from silo.bom.walk.contents import (
     Contents,
@@ -710,7 +711,9 @@ class Reading:
             self._notes.add(FindingCode.SUB_ELEMENT_LINK, link, element=target.element)
         elif target.excluded:
             self._holds_components = True
-            self._notes.add(FindingCode.EXCLUDED, link, by=f"its part {label_of(target.obj)}")
+            self._notes.add(
+                FindingCode.EXCLUDED, link, by=message("its part {obj}", obj=label_of(target.obj))
+            )
         elif not target.instances:  # every element is left out
             self._holds_components = True
         else:
@@ -788,5 +791,5 @@ class Reading:
         if target.scaled:
             self._notes.add(FindingCode.SCALED, link, target=target.obj)
         if target.variant is not None:
-            values = values_of(target.configured, target.obj) or "with its values unchanged"
+            values = values_of(target.configured, target.obj) or message("with its values unchanged")
             self._notes.add(FindingCode.VARIANT, link, target=target.obj, values=values)

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from silo.bom.errors import InputError, SeveralAssembliesError
+from silo.bom.message import message
 from silo.bom.walk.arrays import elements, left_out_by
 from silo.bom.walk.contents import Contents, Lost, ObjectRole
 from silo.bom.walk.document import DocumentRoot, derived, first_of, label_of, object_name, own, same_document
@@ -35,7 +36,7 @@ from silo.bom.walk.targets import Inspect, is_assembly_link
 from silo.bom.walk.tree import COPIES, climbed, is_switched_on
 
 # What to do if a document holds several assemblies. The window says it in its own words.
-NAME_ONE = "Name the right assembly (--assembly NAME)."
+NAME_ONE = message("Name the right assembly (--assembly NAME).")
 
 # The rank of a part that holds no components; what it holds makes it likelier.
 _HOLDS_NOTHING = 4
@@ -241,7 +242,13 @@ def choose_assembly(document: Any, name: str | None = None) -> Any:
     candidates = _candidates(lying)
     likely = _likely(candidates)
     if len(likely) > 1 and candidates[0][0][0] < 2:
-        text = f"{_file(document)} holds {len(likely)} assemblies: {_names_of(likely)}. {NAME_ONE}"
+        text = message(
+            "{document} holds {count} assemblies: {likely}. {name_one}",
+            document=_file(document),
+            count=len(likely),
+            likely=_names_of(likely),
+            name_one=NAME_ONE,
+        )
         raise SeveralAssembliesError(text, document.FileName, list(map(object_name, likely)))
     return likely[0] if len(likely) == 1 else _root_or_part(document, lying, candidates)
 
@@ -269,7 +276,7 @@ def _root_or_part(document: Any, lying: _Lying, candidates: _Candidates) -> Any:
 
 
 def _file(document: Any) -> str:
-    return getattr(document, "FileName", "") or getattr(document, "Label", "") or "The document"
+    return getattr(document, "FileName", "") or getattr(document, "Label", "") or message("The document")
 
 
 def _names_of(containers: Iterable[Any]) -> str:
@@ -284,10 +291,23 @@ def _named(document: Any, name: str) -> Any:
             return matching[0]
         if matching:
             raise InputError(
-                f"{_file(document)} holds {len(matching)} assemblies labelled {name!r}; give the name of "
-                f"the right assembly instead: {_names_of(matching)}."
+                message(
+                    "{document} holds {count} assemblies labelled {name}; give the name of the right "
+                    "assembly instead: {matching}.",
+                    document=_file(document),
+                    count=len(matching),
+                    name=repr(name),
+                    matching=_names_of(matching),
+                )
             )
-    raise InputError(f"{_file(document)} has no assembly named {name!r}; it has: {_names_of(containers)}.")
+    raise InputError(
+        message(
+            "{document} has no assembly named {name}; it has: {containers}.",
+            document=_file(document),
+            name=repr(name),
+            containers=_names_of(containers),
+        )
+    )
 
 
 def _loose_bodies(lying: _Lying) -> list[Any]:

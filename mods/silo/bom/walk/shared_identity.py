@@ -7,6 +7,7 @@ from collections.abc import Iterable
 
 from silo.bom.entry import BomEntry, walk_entries
 from silo.bom.findings import Finding, FindingCode, Place
+from silo.bom.message import Message
 
 
 def identity_findings(entries: Iterable[BomEntry]) -> tuple[Finding, ...]:
@@ -24,15 +25,13 @@ def identity_findings(entries: Iterable[BomEntry]) -> tuple[Finding, ...]:
             findings.append(copied_identity(uuid, where))
             continue
         code, names = FindingCode.SHARED_IDENTITY, [entry.label for entry in components.values()]
-        message = code.sentence.format(
-            count=len(names), file=where[0].doc_path, identity=uuid, names=", ".join(names)
-        )
-        findings.append(Finding(code, code.severity, message, where))
+        values = {"count": len(names), "file": where[0].doc_path, "identity": uuid, "names": ", ".join(names)}
+        findings.append(Finding(code, code.severity, Message(code.sentence, values), where))
     return tuple(findings)
 
 
 def copied_identity(uuid: str, where: tuple[Place, ...]) -> Finding:
     """Make the finding that several files carry one identity."""
     code, files = FindingCode.COPIED_IDENTITY, list(dict.fromkeys(place.doc_path for place in where))
-    message = code.sentence.format(count=len(files), identity=uuid, names=", ".join(files))
-    return Finding(code, code.severity, message, where)
+    values = {"count": len(files), "identity": uuid, "names": ", ".join(files)}
+    return Finding(code, code.severity, Message(code.sentence, values), where)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from silo.bom.findings import FindingCode
+from silo.bom.message import message
 from silo.bom.walk.arrays import array_count, elements, is_array
 from silo.bom.walk.document import (
     LinkProblem,
@@ -278,8 +279,10 @@ def _lost_its_source(link: object, target: object) -> bool:
 def _no_source(link: object, inspect: Inspect | None) -> LinkProblem:
     problem = _no_target(link, inspect)
     if not problem.file:
-        return LinkProblem(FindingCode.BROKEN_LINK, detail="the original of its changed copy is lost")
-    words = "it is the original of a changed copy"
+        return LinkProblem(
+            FindingCode.BROKEN_LINK, detail=message("the original of its changed copy is lost")
+        )
+    words = message("it is the original of a changed copy")
     return replace(problem, detail=f"{problem.detail}; {words}" if problem.detail else words)
 
 
