@@ -27,7 +27,7 @@ from silo.bom_sync.resolved import Resolved
 from silo.bom_sync.steps import Outcome, Status
 from silo.fcstd import Library
 from silo.files import documents_in
-from silo.platform import scratch_folder
+from silo.platform.whole_files import scratch_folder
 from silo.testing import FakeSilo
 
 

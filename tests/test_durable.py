@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from silo.platform import private_file, private_folder, read_memory, replacing, write_memory
+from silo.platform.memory_file import read_memory, write_memory
+from silo.platform.whole_files import private_file, private_folder, replacing
 
 
 @pytest.mark.parametrize("before", [None, b"old"])

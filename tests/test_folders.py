@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-import silo.platform
-from silo.platform import cache_folder, config_folder, data_folder, scratch_folder
+import silo.platform.whole_files
+from silo.platform.user_folders import cache_folder, config_folder, data_folder
+from silo.platform.whole_files import scratch_folder
 from silo_server.settings import settings_from_environment
 
 FOLDERS = [
@@ -80,11 +81,11 @@ def test_a_scratch_folder_is_gone_afterwards(tmp_path: Path) -> None:
 
 def test_all_temporary_folders_are_scratch_folders() -> None:
     """Any other fails on Windows where a program, such as a virus scanner, has a file in it open."""
-    place = Path(silo.platform.__file__)
+    place = Path(silo.platform.whole_files.__file__)
     makers = [
         file.name
         for package in ("silo", "silo_server")
-        for file in (place.parents[1] / package).rglob("*.py")
+        for file in (place.parents[2] / package).rglob("*.py")
         if "TemporaryDirectory(" in file.read_text("utf-8")
     ]
     assert makers == [place.name]

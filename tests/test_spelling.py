@@ -22,7 +22,7 @@ from silo.bom.errors import DocumentError
 from silo.bom.view.tree_json import bom_json
 from silo.cli.reading import read_assembly
 from silo.fcstd import Library
-from silo.platform import Spelling
+from silo.platform.spelling import Spelling
 
 NFD = unicodedata.normalize("NFD", "Büchse")
 
@@ -217,7 +217,7 @@ def test_of_several_names_the_number_of_the_file_decides(tmp_path: Path) -> None
 
 def test_a_folder_without_end_is_listed_to_a_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Names beyond it stay as they were given."""
-    monkeypatch.setattr("silo.platform._LISTED_AT_MOST", 3)
+    monkeypatch.setattr("silo.platform.spelling._LISTED_AT_MOST", 3)
     for number in range(9):
         (tmp_path / f"part {number}").touch()
     assert sum(map(len, Spelling()._listing(str(tmp_path)).values())) == 3

@@ -41,7 +41,7 @@ from silo.bom.walk.document import relative
 from silo.bom_sync.resolved import Resolved, assemblies, blocking, resolve
 from silo.bom_sync.steps import Outcome, Status, SyncApi, server_lines, sync_tree
 from silo.checksums import sha256_of
-from silo.platform import replacing
+from silo.platform.whole_files import replacing
 from silo.proposed_command import proposed
 
 _FINE = (Status.MERGED, Status.UNCHANGED, Status.DRY_RUN)

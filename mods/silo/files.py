@@ -11,7 +11,7 @@ from itertools import chain
 from pathlib import Path
 
 from silo.bom.errors import ConfigError, InputError
-from silo.platform import Spelling
+from silo.platform.spelling import Spelling
 
 IGNORE_FILE = ".siloignore"
 

@@ -15,7 +15,9 @@ from pathlib import Path
 from typing import BinaryIO
 
 from silo.bom.errors import InputError
-from silo.platform import cache_folder, hold_lock, one_path, shows_locks
+from silo.platform.locks import hold_lock, shows_locks
+from silo.platform.spelling import one_path
+from silo.platform.user_folders import cache_folder
 
 _TRIES = 100  # of a lock whose file was deleted by its last holder
 

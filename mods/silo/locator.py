@@ -17,7 +17,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from silo.bom.findings import FindingCode
-from silo.platform import Spelling, Spelt, folded, is_device_name
+from silo.platform.device_names import is_device_name
+from silo.platform.spelling import Spelling, Spelt, folded
 
 _URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+://")
 _STREAM = re.compile(r"\.fcstd:", re.I)

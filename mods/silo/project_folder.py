@@ -22,7 +22,10 @@ from typing import Any
 
 from silo.bom.errors import DocumentError
 from silo.folder_lock import folder_lock
-from silo.platform import data_folder, one_path, read_memory, replacing
+from silo.platform.memory_file import read_memory
+from silo.platform.spelling import one_path
+from silo.platform.user_folders import data_folder
+from silo.platform.whole_files import replacing
 
 PROJECT_FILE = ".silo-project.json"
 OWN_RECORDS = "records.json"

@@ -13,7 +13,7 @@ import shlex
 import subprocess
 from pathlib import Path
 
-from silo.platform import WINDOWS
+from silo.platform.system import WINDOWS
 
 
 def proposed(*words: str | Path) -> str:

@@ -42,7 +42,7 @@ from sqlalchemy import (
 from sqlalchemy.exc import SQLAlchemyError
 
 from silo.bom.errors import ConfigError, SiloError, listed
-from silo.platform import replace_patiently, replacing, scratch_folder, sync_folder
+from silo.platform.whole_files import replace_patiently, replacing, scratch_folder, sync_folder
 from silo_server.actors import SYSTEM
 from silo_server.db.database import Database
 from silo_server.db.migrate import STEPS, check_revision, upgrade

@@ -35,7 +35,9 @@ from sqlalchemy.exc import SQLAlchemyError
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from silo.bom.errors import ConfigError
-from silo.platform import WORKERS_CAN_SHARE_A_SOCKET, allow_many_files, own_the_port, scratch_folder
+from silo.platform.limits import allow_many_files
+from silo.platform.sockets import WORKERS_CAN_SHARE_A_SOCKET, own_the_port
+from silo.platform.whole_files import scratch_folder
 from silo_server.actors import Role
 from silo_server.backup import back_up_before_upgrade
 from silo_server.db.database import WRITERS_WAITING, Database

@@ -16,7 +16,7 @@ from silo.bom.errors import (
 )
 from silo.bom.numbers import yes_or_no
 from silo.file_kind import ATTACHMENT_KINDS
-from silo.platform import data_folder
+from silo.platform.user_folders import data_folder
 
 MIB = 1024 * 1024
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from silo.cli.main import main
-from silo.platform import cache_folder, config_folder, data_folder
+from silo.platform.user_folders import cache_folder, config_folder, data_folder
 
 FREECAD = """#!{python}
 import json, os

@@ -23,7 +23,7 @@ from silo.fcstd.edit import replace_file
 from silo.fcstd.limits import Limits
 from silo.fcstd.repack import replaced_entry
 from silo.fcstd.stamp import _read_back
-from silo.platform import sync_folder
+from silo.platform.whole_files import sync_folder
 
 
 def with_entries(folder: Path) -> Path:

@@ -33,7 +33,8 @@ from silo.outbox.entry import Commit, Entry, State, new_key
 from silo.outbox.send import send_all
 from silo.outbox.store import OutboxError, Store
 from silo.outbox.tables import VERSION
-from silo.platform import replacing, stamp_of
+from silo.platform.stamp import stamp_of
+from silo.platform.whole_files import replacing
 from silo.project_folder import FileRecord, write_record
 from silo.testing import FakeSilo
 from vault import died

@@ -34,7 +34,7 @@ from silo.bom.errors import (
 )
 from silo.bom.items.proposal import propose
 from silo.fcstd import Library, stamp
-from silo.platform import hold_lock
+from silo.platform.locks import hold_lock
 from silo.registering.items import REGISTRATION_PROPERTY, Registration, finished, register
 from silo.registering.journal import RESERVED, Journal, component_key
 

@@ -19,7 +19,7 @@ from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import DocumentError, NotFoundError, SiloError
 from silo.bom.findings import Finding
 from silo.outbox.report import Sent
-from silo.platform import stamp_of
+from silo.platform.stamp import stamp_of
 from silo.registering.candidate import Candidate, ComponentState, OpenedFile
 from silo.registering.items import Registration
 from silo.registering.offer import Offer

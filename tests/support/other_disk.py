@@ -23,7 +23,7 @@ from typing import Any, NoReturn
 
 import pytest
 
-from silo.platform import folded
+from silo.platform.spelling import folded
 
 try:
     import mfusepy as fuse

@@ -10,7 +10,8 @@ from pathlib import Path
 
 from pydantic import BaseModel, ValidationError
 
-from silo.platform import cache_folder, read_memory, write_memory
+from silo.platform.memory_file import read_memory, write_memory
+from silo.platform.user_folders import cache_folder
 
 log = logging.getLogger("silo.api")
 

@@ -16,7 +16,7 @@ from silo.api.transport import Cancel
 from silo.api.wire import Revision
 from silo.bom.errors import ConflictError, NotFoundError
 from silo.bom.message import message
-from silo.platform import scratch_folder
+from silo.platform.whole_files import scratch_folder
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient

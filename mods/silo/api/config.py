@@ -26,7 +26,9 @@ from silo.api.address import ServerAddress, same_server
 from silo.bom.errors import ConfigError, did_you_mean
 from silo.bom.message import joined, message
 from silo.bom.numbers import yes_or_no
-from silo.platform import MODES_COUNT, config_folder, replacing
+from silo.platform.system import MODES_COUNT
+from silo.platform.user_folders import config_folder
+from silo.platform.whole_files import replacing
 
 log = logging.getLogger("silo.api")
 

@@ -33,7 +33,7 @@ from silo.bom.message import message
 from silo.bom.numbers import whole_number
 from silo.bom.text import with_allowed_characters
 from silo.file_kind import MODEL
-from silo.platform import remove_patiently, replacing
+from silo.platform.whole_files import remove_patiently, replacing
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient

@@ -12,7 +12,7 @@ from silo.bom.errors import NewerRevisionError
 from silo.bom.message import message
 from silo.checksums import bare_checksum, seen_as
 from silo.file_kind import MODEL, kind_by_name
-from silo.platform import no_device_name
+from silo.platform.device_names import no_device_name
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from silo.platform import read_memory, write_memory
+from silo.platform.memory_file import read_memory, write_memory
 
 
 class Memory:

@@ -11,7 +11,7 @@ from dataclasses import replace
 from silo.bom.compare.merge import MergePlan
 from silo.bom_sync.memory import Memory
 from silo.bom_sync.resolved import Resolved
-from silo.platform import cache_folder
+from silo.platform.user_folders import cache_folder
 
 
 def reported_lines() -> Memory:

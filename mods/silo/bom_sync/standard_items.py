@@ -15,7 +15,7 @@ from typing import Any
 from silo.bom.entry import BomEntry, walk_entries
 from silo.bom.errors import SiloError
 from silo.bom_sync.memory import Memory, server_of
-from silo.platform import data_folder
+from silo.platform.user_folders import data_folder
 
 # Each costs a request, and only while the part is not registered.
 MOST_LOOKED_UP = 200

@@ -17,7 +17,7 @@ from silo.bom.walk.links import extract
 from silo.bom.walk.roots import choose_assembly
 from silo.cli.options import EACH
 from silo.cli.progress import count_steps
-from silo.platform import processors
+from silo.platform.processes import processors
 
 if TYPE_CHECKING:
     from silo.vault.plan import Plan

@@ -59,7 +59,7 @@ from silo.inertia.geometry.worker import say
 from silo.inertia.notes import DOUBTFUL
 from silo.inertia.placements import is_rigid
 from silo.locator import FoundFile, Locator
-from silo.platform import remove_patiently, scratch_folder
+from silo.platform.whole_files import remove_patiently, scratch_folder
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient

@@ -20,7 +20,8 @@ from silo.fcstd.container import ContainerFile, FileStat, ZipEntry, document_xml
 from silo.fcstd.errors import FcstdError
 from silo.fcstd.limits import Limits
 from silo.fcstd.repack import Piece
-from silo.platform import copy_rights, patiently, remove_patiently, swap, sync_folder
+from silo.platform.file_swap import copy_rights, patiently, swap
+from silo.platform.whole_files import remove_patiently, sync_folder
 
 _REFERENCES = {'"': "&quot;", "'": "&apos;", "\n": "&#10;", "\r": "&#13;", "\t": "&#9;"}
 

@@ -26,7 +26,7 @@ from silo.fcstd.expat_reader import Malformed, Span, XmlElement
 from silo.fcstd.library import Library
 from silo.fcstd.limits import Limits
 from silo.fcstd.repack import replaced_entry
-from silo.platform import one_path
+from silo.platform.spelling import one_path
 
 _LONGEST = 200
 

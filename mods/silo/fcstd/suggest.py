@@ -23,7 +23,7 @@ from silo.bom.message import Message, message, template
 from silo.bom.walk.identity import identity_of
 from silo.fcstd.document import FcstdDocument
 from silo.fcstd.library import Library
-from silo.platform import folded
+from silo.platform.spelling import folded
 from silo.proposed_command import proposed
 
 # A project has some hundreds of files; a home folder taken for one would have many more.

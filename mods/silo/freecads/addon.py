@@ -20,7 +20,8 @@ from typing import Any
 from silo import FREECAD_PACKAGES, OPTIONAL_PACKAGES
 from silo.bom.errors import ConfigError, InputError
 from silo.freecads.run import ask_inside, find_freecadcmd
-from silo.platform import child_options, python_beside, remove_patiently
+from silo.platform.processes import child_options, python_beside
+from silo.platform.whole_files import remove_patiently
 from silo.shipped_files import shipped
 
 # The Addon Manager's name for it, so that there is only one folder; and the earlier name.

@@ -17,7 +17,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from silo.freecads.places import cache_folders
-from silo.platform import is_locked
+from silo.platform.locks import is_locked
 
 _FOLDER = re.compile(r"(?P<program>.+)_Doc_[0-9a-fA-F-]{36}_(?P<hash>[0-9a-f]{6})_(?P<number>\d+)")
 

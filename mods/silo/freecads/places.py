@@ -13,7 +13,8 @@ import shutil
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from silo.platform import NAME, Spelling
+from silo.platform.spelling import Spelling
+from silo.platform.system import NAME
 
 _COMMANDS = ("freecadcmd", "FreeCADCmd", "freecadcmd-daily", "freecad.cmd")
 _FLATPAK = "org.freecad.FreeCAD"

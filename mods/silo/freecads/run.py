@@ -23,12 +23,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
 
-from silo import platform
 from silo.bom.entry import Extraction
 from silo.bom.errors import ConfigError, DocumentError, InputError, SiloError
 from silo.bom.snapshot import from_plain
 from silo.freecads.places import commands, exchange_folder, start
-from silo.platform import scratch_folder
+from silo.platform import processes
+from silo.platform.whole_files import scratch_folder
 
 HEADLESS = Path(__file__).resolve().parents[1] / "workbench" / "headless.py"
 # FreeCAD opens large assemblies in minutes; this is per file.
@@ -106,7 +106,7 @@ def ask_inside(command: str, script: str, env: Mapping[str, str]) -> Any:
                     env={**os.environ, **env, "SILO_SCRIPT": str(path), "SILO_OUT": str(out)},
                     timeout=_ASK_S,
                     check=False,
-                    **platform.child_options(),
+                    **processes.child_options(),
                 )
         except (OSError, subprocess.TimeoutExpired) as error:
             raise ConfigError(f"{command} does not answer: {error}") from error
@@ -222,7 +222,7 @@ class FreeCADRun:
                     # FreeCAD reads a FreeCAD.cfg in the current folder; here is none.
                     cwd=self._folder.name,
                     env=env,
-                    **platform.child_options(group=True),
+                    **processes.child_options(group=True),
                 )
         except OSError as error:
             self._folder.cleanup()
@@ -269,7 +269,7 @@ class FreeCADRun:
 
     def _stop(self) -> None:
         if self._process is not None:
-            platform.end(self._process)
+            processes.end(self._process)
 
 
 def _complete_lines(file: IO[str]) -> Iterator[dict[str, Any]]:
@@ -292,4 +292,4 @@ def _last_words(code: int, log: Path) -> tuple[str, str]:
     if crash := _CRASHED.search(text):
         code, text = -signal.Signals[crash[1]], text[: crash.start()]
     lines = [line.strip() for line in text.splitlines() if line.strip()]
-    return platform.how_it_ended(code), " / ".join(lines[-3:]) or "nothing"
+    return processes.how_it_ended(code), " / ".join(lines[-3:]) or "nothing"

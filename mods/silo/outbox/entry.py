@@ -29,7 +29,7 @@ from uuid import uuid4
 
 from silo.bom.entry import Extraction
 from silo.checksums import seen_as
-from silo.platform import Stamp
+from silo.platform.stamp import Stamp
 
 
 class State(StrEnum):

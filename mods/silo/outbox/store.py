@@ -41,17 +41,17 @@ from silo.folder_lock import folder_lock
 from silo.outbox.entry import ASKED, SAME_PART, UNKNOWN, Commit, CommitFields, Entry, State, on_top
 from silo.outbox.held_here import HeldHere, held_row
 from silo.outbox.tables import SELECT, TABLES, VERSION, entry_of
-from silo.platform import (
-    data_folder,
-    hold_lock,
-    one_path,
+from silo.platform.locks import hold_lock
+from silo.platform.memory_file import read_memory
+from silo.platform.spelling import one_path
+from silo.platform.stamp import stamp_of
+from silo.platform.user_folders import data_folder
+from silo.platform.whole_files import (
     private_file,
-    read_memory,
     remove_patiently,
     replace_patiently,
     replacing,
     scratch_folder,
-    stamp_of,
     sync_folder,
 )
 from silo.project_folder import FileRecord, record_of

@@ -25,7 +25,8 @@ from typing import Any
 from silo.bom.entry import BomEntry
 from silo.bom.errors import InputError
 from silo.folder_lock import folder_lock
-from silo.platform import data_folder, private_file, private_folder, remove_patiently, replacing
+from silo.platform.user_folders import data_folder
+from silo.platform.whole_files import private_file, private_folder, remove_patiently, replacing
 
 
 def component_key(entry: BomEntry) -> str:

@@ -13,7 +13,9 @@ from pathlib import Path
 
 from silo.bom.entry import BomEntry
 from silo.bom.items.stems import stems
-from silo.platform import data_folder, one_path, read_memory, write_memory
+from silo.platform.memory_file import read_memory, write_memory
+from silo.platform.spelling import one_path
+from silo.platform.user_folders import data_folder
 
 # Of a folder, the newest choices.
 MOST_LEARNT = 200

@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from silo.bom.errors import InputError
-from silo.platform import hold_lock, remove_patiently
+from silo.platform.locks import hold_lock
+from silo.platform.whole_files import remove_patiently
 
 log = logging.getLogger("silo.vault")
 

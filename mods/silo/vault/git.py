@@ -22,7 +22,9 @@ from typing import BinaryIO
 
 from silo.bom.errors import DocumentError, InputError
 from silo.files import IGNORE_FILE
-from silo.platform import WINDOWS, child_options, remove_patiently
+from silo.platform.processes import child_options
+from silo.platform.system import WINDOWS
+from silo.platform.whole_files import remove_patiently
 
 _CHUNK = 1 << 20
 _POINTER = re.compile(rb"version https://git-lfs\.github\.com/spec/v1\n(?:.*\n)*?oid sha256:([0-9a-f]{64})\n")

@@ -32,7 +32,7 @@ from silo.fcstd.contents import FileContents
 from silo.fcstd.errors import FcstdError
 from silo.fcstd.facts import FileFacts
 from silo.locator import Locator
-from silo.platform import cache_folder
+from silo.platform.user_folders import cache_folder
 from silo.vault.answers import SeenFile, StoredAnswer, led_to
 from silo.vault.database import FORMAT, IndexDatabase
 

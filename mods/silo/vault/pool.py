@@ -10,7 +10,7 @@ from typing import Any
 from uuid import uuid4
 
 from silo.bom.errors import InputError
-from silo.platform import workers
+from silo.platform.processes import workers
 from silo.vault.questions import Done, KnownFiles, Question, collect_seldom, work
 
 CHUNK = 64

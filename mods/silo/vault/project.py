@@ -47,7 +47,7 @@ from silo.locator import FoundFile, Locator
 from silo.outbox.entry import SAME_PART, UNKNOWN, Commit, Entry, InFile, State, new_key, on_top
 from silo.outbox.recorded import arrived
 from silo.outbox.store import Store
-from silo.platform import one_path
+from silo.platform.spelling import one_path
 from silo.project_folder import FileRecord, Project
 from silo.vault.revisions import file_revisions
 

@@ -28,7 +28,8 @@ from silo.file_kind import MODEL, kind_by_name
 from silo.file_state import FileState, file_state
 from silo.locator import refusal
 from silo.outbox.recorded import arrived, uid_of
-from silo.platform import folded, one_path, replacing
+from silo.platform.spelling import folded, one_path
+from silo.platform.whole_files import replacing
 from silo.project_folder import FileRecord, Project, record_of
 from silo.vault.tree import Fetched, FileTree, LostLink
 

@@ -27,7 +27,7 @@ from silo.bom.walk.links import extract
 from silo.bom.walk.roots import choose_assembly
 from silo.fcstd import Library
 from silo.fcstd.contents import FileContents
-from silo.platform import remove_patiently, scratch_folder
+from silo.platform.whole_files import remove_patiently, scratch_folder
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient

@@ -28,7 +28,7 @@ from silo.bom.errors import DocumentError, InputError, NotFoundError, RouteMissi
 from silo.fcstd.linked import recorded_paths
 from silo.file_kind import is_model
 from silo.locator import refusal
-from silo.platform import scratch_folder
+from silo.platform.whole_files import scratch_folder
 from silo.vault.revisions import file_revisions
 
 if TYPE_CHECKING:

@@ -285,7 +285,7 @@ def _without_server(job: HeadlessJob, error: ImportError) -> int:
 
 def _write(path: str, text: str) -> None:
     """Write the whole report or nothing, so that a run that crashes leaves the previous report."""
-    from silo.platform import replacing
+    from silo.platform.whole_files import replacing
 
     target = Path(path)
     if target.exists() and not target.is_file():  # a terminal, a pipe

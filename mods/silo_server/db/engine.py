@@ -20,7 +20,8 @@ from sqlalchemy import (
     event,
 )
 
-from silo.platform import data_folder, private_file, private_folder
+from silo.platform.user_folders import data_folder
+from silo.platform.whole_files import private_file, private_folder
 from silo_server.settings import Settings
 
 # [s] For so long a writer waits: in our own queue, and then for another process or another transaction.

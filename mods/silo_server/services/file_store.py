@@ -18,7 +18,8 @@ from typing import IO
 
 from silo.bom.errors import NotFoundError
 from silo.file_kind import MODEL, kind_of
-from silo.platform import no_device_name, remove_patiently, replace_patiently, sync_folder
+from silo.platform.device_names import no_device_name
+from silo.platform.whole_files import remove_patiently, replace_patiently, sync_folder
 from silo_server.services.thumbnails import read_thumbnail
 
 

@@ -18,7 +18,7 @@ from silo.inertia.geometry import Mesh, ReadOptions, read
 from silo.inertia.geometry.cache import Cache, default_folder, fingerprint, key_of, key_parts, measured_by
 from silo.inertia.geometry.stored import FORMAT, load, save
 from silo.inertia.notes import Note
-from silo.platform import cache_folder
+from silo.platform.user_folders import cache_folder
 
 IMPOSSIBLE = 1
 """[MB] of memory with which nothing can be read: what is answered then comes from the cache."""

@@ -30,7 +30,7 @@ from silo.inertia.geometry.kernel.solids import measure_all
 from silo.inertia.geometry.step import read_step
 from silo.inertia.geometry.step_text import begin
 from silo.inertia.notes import GeometryCode
-from silo.platform import processors
+from silo.platform.processes import processors
 
 OPTIONS = ReadOptions(isolate=False, cache=False)
 

@@ -18,7 +18,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any, Self
 
-from silo.platform import own_the_port
+from silo.platform.sockets import own_the_port
 
 TIMEOUT = 300  # [s], reached only if the test fails; a busy machine may need minutes
 

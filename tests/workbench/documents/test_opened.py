@@ -11,7 +11,7 @@ from desk import Office
 
 from silo.outbox.entry import Commit
 from silo.outbox.send import send_all
-from silo.platform import stamp_of
+from silo.platform.stamp import stamp_of
 from silo.workbench.documents.opened import Opened
 
 

@@ -24,7 +24,7 @@ from silo.outbox.entry import UNKNOWN, Commit, Entry, State
 from silo.outbox.report import Sent
 from silo.outbox.send import send_all
 from silo.outbox.store import OutboxError, Store
-from silo.platform import stamp_of
+from silo.platform.stamp import stamp_of
 from silo.workbench.documents.opened import DocumentOrigin
 from silo.workbench.session.last_events import LastIds
 from silo.workbench.session.online import Online

@@ -16,7 +16,7 @@ from silo.bom.view.folders import shorten
 from silo.bom.view.tree_json import finding_json
 from silo.cli.json_output import json_text, print_json
 from silo.cli.options import add_options
-from silo.platform import replacing, scratch_folder
+from silo.platform.whole_files import replacing, scratch_folder
 
 if TYPE_CHECKING:
     from silo.bom.compare.two_states import AssemblyChange, LineChange

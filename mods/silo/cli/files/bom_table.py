@@ -15,7 +15,7 @@ from silo.bom.headers import safe_cell
 from silo.bom.text import with_allowed_characters
 from silo.bom.view.flat_list import PIECES, flat_json
 from silo.bom.view.tree_json import bom_json
-from silo.platform import replacing
+from silo.platform.whole_files import replacing
 
 
 def table_rows(extraction: Extraction, *, flat: bool) -> list[list[str | int]]:

@@ -49,7 +49,7 @@ def add_order(parser: argparse.ArgumentParser) -> None:
 
 def run_order(args: argparse.Namespace) -> int:
     """Print what to order, or write it as a table."""
-    from silo.platform import replacing
+    from silo.platform.whole_files import replacing
 
     asked = {"pieces": args.quantity, "spares": args.spares, "release": args.release, "rest": args.rest}
     given = {name: str(value) for name, value in asked.items() if value}

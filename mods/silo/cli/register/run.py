@@ -74,7 +74,7 @@ class RegisterRun:
 
     def write_plan(self, unused: frozenset[str]) -> int:
         """Write the table of all components, and register nothing."""
-        from silo.platform import replacing
+        from silo.platform.whole_files import replacing
 
         earlier = CandidateFiles()
 

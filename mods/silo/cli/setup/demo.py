@@ -35,7 +35,7 @@ from silo.cli.setup.demo_edits import remove_from_assembly, set_element_count
 from silo.cli.setup.server import need_server_extra
 from silo.cli.sync_display import activity_box, outcome_text
 from silo.cli.terminal import console
-from silo.platform import scratch_folder
+from silo.platform.whole_files import scratch_folder
 from silo.registering.closed_files import proposals_for, register_all
 from silo.shipped_files import shipped
 

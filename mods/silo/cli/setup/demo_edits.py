@@ -12,7 +12,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from silo.bom.errors import DocumentError
-from silo.platform import replace_patiently
+from silo.platform.whole_files import replace_patiently
 
 DOCUMENT_XML = "Document.xml"
 

@@ -45,7 +45,8 @@ _CACHED = ("documents.sqlite3*", "geometry", "servers.json", "unreferenced.json"
 
 def _clean() -> str:
     """Delete what is remembered in the cache, and return how much it was."""
-    from silo.platform import cache_folder, remove_patiently
+    from silo.platform.user_folders import cache_folder
+    from silo.platform.whole_files import remove_patiently
 
     folder = cache_folder()
     found = [path for name in _CACHED for path in folder.glob(name)]
@@ -79,7 +80,7 @@ def run_doctor(args: argparse.Namespace) -> int:
 def _machine() -> Rows:
     """Describe this machine: versions, folders, extras, FreeCAD and the add-on in it."""
     from silo.freecads.places import material_folders
-    from silo.platform import cache_folder, data_folder
+    from silo.platform.user_folders import cache_folder, data_folder
 
     place = _tried(_freecad)
     return {

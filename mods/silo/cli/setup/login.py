@@ -43,7 +43,7 @@ def run_whoami(args: argparse.Namespace) -> int:
 def run_logout(args: argparse.Namespace) -> int:
     """Remove the configuration that ``login`` wrote; a token in the environment stays."""
     from silo.api.config import checked_config, config_path
-    from silo.platform import remove_patiently
+    from silo.platform.whole_files import remove_patiently
 
     path = config_path()
     there = path.exists()

@@ -28,7 +28,8 @@ from silo.inertia.geometry.options import ReadOptions
 from silo.inertia.geometry.part_files import file_key, step_files
 from silo.inertia.geometry.reading import GeometryReading
 from silo.inertia.geometry.stored import FORMAT, load
-from silo.platform import cache_folder, remove_patiently, replacing
+from silo.platform.user_folders import cache_folder
+from silo.platform.whole_files import remove_patiently, replacing
 
 KERNELS = ("cadquery-ocp-novtk", "cadquery-ocp", "trimesh", "manifold3d", "numpy")
 

@@ -21,9 +21,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
-from silo import platform
 from silo.bom.errors import CancelledError, ConfigError, DocumentError
 from silo.inertia.geometry.options import Progress, ReadOptions
+from silo.platform import processes
 
 POLL_SECONDS = 0.05
 
@@ -108,12 +108,12 @@ def _child(
         stdout=subprocess.PIPE,
         stderr=errors,
         env={**_environment(), **env},
-        **platform.child_options(group=True),
+        **processes.child_options(group=True),
     )
     try:
         yield process
     finally:
-        platform.end(process)
+        processes.end(process)
         process.wait()
         if process.stdout is not None:
             process.stdout.close()
@@ -123,7 +123,7 @@ def python() -> str:
     """Find a Python interpreter to start. Inside FreeCAD ``sys.executable`` is FreeCAD itself."""
     if "python" in Path(sys.executable or "").name.lower():
         return sys.executable
-    for path in platform.python_beside(sys.base_exec_prefix):
+    for path in processes.python_beside(sys.base_exec_prefix):
         if os.path.isfile(path):
             return path
     raise ConfigError(
@@ -148,7 +148,7 @@ def _death(code: int, errors: IO[bytes], options: ReadOptions) -> str:
         return f"needs more than the {options.memory_mb} MB allowed to read it; allow more memory"
     if code < 0:
         return (
-            f"the geometry kernel {platform.how_it_ended(code)} on it; the file is damaged, or trips "
+            f"the geometry kernel {processes.how_it_ended(code)} on it; the file is damaged, or trips "
             "a bug of the kernel. Export it again, or with another application protocol"
         )
     last = next((line for line in reversed(words.splitlines()) if line.strip()), f"exit code {code}")

@@ -42,7 +42,7 @@ from silo.inertia.geometry.measured import Measured
 from silo.inertia.geometry.options import ReadOptions, Report
 from silo.inertia.geometry.reading import GeometryReading
 from silo.inertia.placements import is_rigid
-from silo.platform import remove_patiently, scratch_folder
+from silo.platform.whole_files import remove_patiently, scratch_folder
 
 
 def read_freecad(

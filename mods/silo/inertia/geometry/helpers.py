@@ -7,7 +7,8 @@ instead, so the result and the errors are those of one process. Only the process
 they end with it.
 
 Each helper may use its share of the memory that the reading process may use. Each is a pool of one worker
-(:func:`silo.platform.workers`), for a worker that dies breaks its pool, and loses what that one had begun.
+(:func:`silo.platform.processes.workers`), for a worker that dies breaks its pool, and loses what that one had
+begun.
 """
 
 from __future__ import annotations
@@ -24,8 +25,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Self, TypeAlias, TypeVar
 
-from silo import platform
-from silo.platform import processors, remove_patiently, scratch_folder
+from silo.platform import limits, processes
+from silo.platform.processes import processors
+from silo.platform.whole_files import remove_patiently, scratch_folder
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -147,7 +149,7 @@ class _Helper:
 
     def __init__(self, folder: Path, memory_mb: int) -> None:
         self._files = (folder / str(number) for number in count())
-        self._process = platform.workers(1, _begin, memory_mb)
+        self._process = processes.workers(1, _begin, memory_mb)
         self._process.submit(int)  # it starts with the first task
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="helper")
 
@@ -190,7 +192,7 @@ class _Helper:
 
     def end(self) -> None:
         """End at once; the helper's present task is no longer needed."""
-        platform.end_workers(self._process)
+        processes.end_workers(self._process)
         self._thread.shutdown(wait=True, cancel_futures=True)
 
     def _sent(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Future[Path]:
@@ -218,7 +220,7 @@ _noise: IO[bytes]
 
 def _begin(memory_mb: int) -> None:
     global _noise
-    platform.limit_this_process(memory=memory_mb * 1024**2)
+    limits.limit_this_process(memory=memory_mb * 1024**2)
     _noise = tempfile.TemporaryFile()  # noqa: SIM115 - open as long as the process
     os.dup2(_noise.fileno(), 1)
 

@@ -16,7 +16,7 @@ from silo.inertia.geometry.helpers import Helpers
 from silo.inertia.geometry.options import Progress, ReadOptions, Report
 from silo.inertia.geometry.reading import GeometryReading
 from silo.inertia.geometry.stored import load
-from silo.platform import scratch_folder
+from silo.platform.whole_files import scratch_folder
 
 ATTEMPTS = 3
 """Readings of a file that changes meanwhile, before that is an error."""

@@ -74,7 +74,7 @@ from silo.inertia.geometry.reading import GeometryReading
 from silo.inertia.geometry.step_text import MARK, Prepared, SphereTurn, prepare, with_turned_spheres
 from silo.inertia.geometry.together import Floats, combined
 from silo.inertia.notes import GeometryCode, Note
-from silo.platform import scratch_folder
+from silo.platform.whole_files import scratch_folder
 
 
 def read_step(

@@ -21,7 +21,7 @@ from silo.inertia.geometry.read import read_here
 from silo.inertia.geometry.reading import GeometryReading
 from silo.inertia.geometry.stored import save
 from silo.inertia.notes import GeometryCode, Note
-from silo.platform import limit_this_process
+from silo.platform.limits import limit_this_process
 
 _COMPLAINT = re.compile(rb"ERR|Fail|\*\*\*|Exception|Unresolved", re.IGNORECASE)
 

@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 from silo.bom.errors import InputError
-from silo.platform import replacing
+from silo.platform.whole_files import replacing
 
 
 def write_whole(path: Path | str, data: bytes, *, like: Path | str | None = None) -> None:

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 from silo.bom.compare.states import ComparedAssembly
 from silo.bom.errors import DocumentError, SiloError
 from silo.outbox.entry import UNKNOWN, Commit, new_key, on_top
-from silo.platform import one_path
+from silo.platform.spelling import one_path
 from silo.project_folder import record_of
 from silo.workbench.activity.box import Action, Do, PaneEntry, not_in_silo_key, own_box
 from silo.workbench.colleagues.look import FileToCheck, look

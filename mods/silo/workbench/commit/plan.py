@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
-from silo.platform import one_path
+from silo.platform.spelling import one_path
 from silo.workbench.desk import MOST_S, Documents
 from silo.workbench.documents.order import leaves_first
 from silo.workbench.words import plain, translate

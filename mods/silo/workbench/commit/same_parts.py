@@ -12,7 +12,8 @@ from pathlib import Path
 
 from silo.bom.entry import Extraction, walk_entries
 from silo.bom.findings import Finding, FindingCode
-from silo.platform import data_folder, read_memory, write_memory
+from silo.platform.memory_file import read_memory, write_memory
+from silo.platform.user_folders import data_folder
 
 
 class Decisions:

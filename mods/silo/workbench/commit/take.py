@@ -10,7 +10,8 @@ from typing import Any, Protocol
 
 from silo.bom.errors import DocumentError, SiloError
 from silo.outbox.entry import new_key
-from silo.platform import Stamp, one_path, stamp_of
+from silo.platform.spelling import one_path
+from silo.platform.stamp import Stamp, stamp_of
 from silo.workbench.commit.plan import DocumentRow, DocumentState
 from silo.workbench.desk import Documents, is_edited
 from silo.workbench.documents.opened import DocumentOrigin

@@ -16,14 +16,14 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
-    from silo.platform import Stamp
+    from silo.platform.stamp import Stamp
 
 
 def _stamp(path: str) -> Stamp | None:
     """Return a stamp that changes when the file is written; None if there is no file. Imports late, for
     FreeCAD's start.
     """
-    from silo.platform import stamp_of
+    from silo.platform.stamp import stamp_of
 
     return stamp_of(path)
 

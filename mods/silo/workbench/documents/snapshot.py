@@ -17,7 +17,7 @@ from silo.bom.snapshot import to_plain
 from silo.bom.walk.identity import held_items, sole_identity
 from silo.bom.walk.links import extract, file_bom
 from silo.bom.walk.roots import NAME_ONE
-from silo.platform import one_path
+from silo.platform.spelling import one_path
 from silo.workbench.words import translate
 
 

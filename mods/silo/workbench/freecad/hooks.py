@@ -83,7 +83,7 @@ class CommitHook:
     def slotFinishSaveDocument(self, doc: Any, filename: str) -> None:
         """Note that a document is completely on the disk."""
         # "Save a copy" names another file than the document's own.
-        from silo.platform import one_path  # late: FreeCAD's start waits for this module
+        from silo.platform.spelling import one_path
 
         if doc.FileName and one_path(filename) == one_path(doc.FileName):
             self.note(doc, committed=False)

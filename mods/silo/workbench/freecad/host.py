@@ -240,7 +240,7 @@ def active_document() -> Any:
 
 def documents_by_path() -> dict[str, Any]:
     """Return the open documents by the paths of their files, each in the spelling that its folder lists."""
-    from silo.platform import Spelling  # late: FreeCAD's start waits for this module
+    from silo.platform.spelling import Spelling
 
     real = Spelling().real
     return {real(doc.FileName): doc for doc in documents() if doc.FileName}
@@ -248,7 +248,7 @@ def documents_by_path() -> dict[str, Any]:
 
 def find_document(path: str) -> Any:
     """Return the open document of a file; None if it is not open."""
-    from silo.platform import one_path
+    from silo.platform.spelling import one_path
 
     return documents_by_path().get(one_path(path))
 

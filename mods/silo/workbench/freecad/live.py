@@ -22,7 +22,7 @@ from silo.bom.walk.document import LinkProblem, object_name
 from silo.bom.walk.links import extract, why
 from silo.bom.walk.roots import choose_assembly
 from silo.bom.walk.targets import is_assembly_link, is_link
-from silo.platform import Spelling, one_path
+from silo.platform.spelling import Spelling, one_path
 from silo.workbench.freecad import host
 from silo.workbench.freecad.cached import CachedDocument, FactCache
 from silo.workbench.freecad.damage import damage

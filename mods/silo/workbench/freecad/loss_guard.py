@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from silo.bom.errors import SiloError
 from silo.bom.walk.document import saved_by
 from silo.outbox.store import KEPT_ASIDE_DAYS
-from silo.platform import replacing
+from silo.platform.whole_files import replacing
 from silo.workbench.activity.box import PaneEntry, own_box
 from silo.workbench.freecad import host
 from silo.workbench.freecad.lost import lost_objects

@@ -13,7 +13,7 @@ from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import Any
 
-from silo.platform import stamp_of
+from silo.platform.stamp import stamp_of
 from silo.workbench.freecad import host
 from silo.workbench.freecad.damage import DAMAGED, damage
 from silo.workbench.freecad.lost import refuse_loss

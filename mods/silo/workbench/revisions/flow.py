@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 from silo.bom.errors import DocumentError, SiloError
 from silo.outbox.store import KEPT_ASIDE_DAYS
-from silo.platform import cache_folder
+from silo.platform.user_folders import cache_folder
 from silo.workbench.activity.box import own_box
 from silo.workbench.colleagues.theirs import Choice, Theirs
 from silo.workbench.documents.opened import DocumentOrigin
@@ -162,7 +162,7 @@ class RevisionFlow:
         already.
         """
         from silo.checksums import content_hash
-        from silo.platform import remove_patiently, replacing
+        from silo.platform.whole_files import remove_patiently, replacing
 
         doc, outbox, kept = self._desk.find(path), self._session.outbox, list[str]()
         # The file on disk is mine, or it is a third person's.
@@ -270,7 +270,7 @@ class RevisionFlow:
         """Fetch a file with all linked files. Files that FreeCAD has open, or that have edits that are not in
         Silo, are left alone; ``overwrite`` replaces the latter and keeps copies.
         """
-        from silo.platform import Spelling  # late: FreeCAD's start waits for this module
+        from silo.platform.spelling import Spelling
 
         real = Spelling().real  # a link may have opened the file under another spelling of its name
         mine = {real(path) for path in self._desk.open_paths()}

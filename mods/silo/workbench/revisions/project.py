@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from silo.bom.errors import DocumentError, InputError, SiloError
 from silo.outbox.entry import State
-from silo.platform import one_path
+from silo.platform.spelling import one_path
 from silo.project_folder import PROJECT_FILE, Project
 from silo.workbench.colleagues.states import state_words
 from silo.workbench.colleagues.theirs import Choice, Theirs, theirs_of

@@ -6,7 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 from time import monotonic
 
-from silo.platform import read_memory, write_memory
+from silo.platform.memory_file import read_memory, write_memory
 
 SAVE_EVERY_S = 10.0
 

@@ -18,7 +18,7 @@ from typing import IO, Any
 from silo.bom.headers import safe_cell
 from silo.bom.quantities import as_decimal
 from silo.bom.text import with_allowed_characters
-from silo.platform import scratch_folder
+from silo.platform.whole_files import scratch_folder
 from silo_server.services.product.export import COLUMNS, PICTURE, Export
 from silo_server.services.thumbnails import png_size
 from silo_server.user_json import dumps

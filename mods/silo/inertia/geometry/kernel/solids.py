@@ -131,7 +131,7 @@ from silo.inertia.geometry.together import (
 )
 from silo.inertia.notes import GeometryCode, Note
 from silo.inertia.placements import place
-from silo.platform import remove_patiently
+from silo.platform.whole_files import remove_patiently
 
 TENSOR_SHARE = 1e-4
 """Of the tolerance, for solids of planes, cylinders, cones, spheres and tori: they cost little at the finer
