@@ -227,11 +227,11 @@ def create_app(settings: Settings, clock: Clock = utc_now) -> FastAPI:
         redoc_url=None,
         lifespan=lifespan,
     )
-    for router in routers():
-        app.include_router(router)
-    errors.install(app)
     from silo_server.web import pages
 
+    for router in routers():
+        app.include_router(router, dependencies=pages.DEPENDENCIES if router in pages.ROUTERS else ())
+    errors.install(app)
     pages.install(app)
     app.add_middleware(BodyLimit, settings=settings)
     app.add_middleware(UnknownCallers, find_user=find_user)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from uuid import uuid4
 
 from openpyxl import load_workbook
 from playwright.sync_api import Page, expect
@@ -64,3 +65,22 @@ def test_paper_has_all_of_it_and_nothing_else(api: Api, visit: Visit) -> None:
     page.goto(f"/items/{top}")
     for gone in (".top", "#view", ".twist"):
         expect(page.locator(gone).first).to_be_hidden()
+
+
+def test_an_order_list_fits_its_sheet(visit: Visit, api: Api) -> None:
+    """A4 upright, 12 mm of edge: the last column, the lead time, is on the paper, whatever the names are."""
+    top = api.item(item_type="assembly")
+    part = api.item("B" * 40 + uuid4().hex[:8], name="Deep groove ball bearing with " * 3)
+    offer = {"supplier": "Kugellager & Söhne", "number": "6204-2RSH/C3-" + "X" * 30, "lead_time_days": 21}
+    offer |= {"prices": [{"quantity": 1, "price": 1234.56}], "pack_size": 10}
+    api.good("PUT", f"/api/items/{part}/suppliers", {"supplier_parts": [offer]})
+    api.merge(top, {part: 1234})
+    ordered = {"parts": [{"part_number": part, "quantity": 10, "supplier": "Kugellager & Söhne"}]}
+    api.good("POST", f"/api/items/{top}/orders", ordered)
+    page = visit("admin", viewport={"width": 703, "height": 1000})  # 186 mm
+    page.goto(f"/items/{top}/order?pieces=5")
+    page.emulate_media(media="print")
+    assert page.evaluate("document.documentElement.scrollWidth") <= 703
+    last = page.get_by_role("cell", name="21 days").bounding_box()
+    assert last is not None
+    assert last["x"] + last["width"] <= 703

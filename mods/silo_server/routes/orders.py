@@ -24,6 +24,7 @@ from silo_server.routes import openapi
 from silo_server.routes.answers import READ_ERRORS, WRITE_ERRORS, etag_of, json_answer
 from silo_server.routes.bom.imports import IMPORT_BODY, uploaded
 from silo_server.routes.call import Admin, Call, Editor, Viewer
+from silo_server.routes.known_parameters import refuse_unknown
 from silo_server.routes.made_files import CSV, XLSX, content_of, file_of
 from silo_server.routes.models import Brief, RequestBody, Short, Text
 from silo_server.routes.requests import BoundedRoute, ExpectedVersion
@@ -34,7 +35,13 @@ from silo_server.services.product.export import Export
 from silo_server.services.product.export_files import to_csv, to_xlsx
 from silo_server.services.suppliers import decimal_text
 
-router = APIRouter(route_class=BoundedRoute, prefix="/api", tags=["orders"], responses=READ_ERRORS)
+router = APIRouter(
+    route_class=BoundedRoute,
+    prefix="/api",
+    tags=["orders"],
+    responses=READ_ERRORS,
+    dependencies=[Depends(refuse_unknown())],
+)
 
 
 def _exact(value: object) -> object:

@@ -19,12 +19,12 @@ from dataclasses import dataclass
 from itertools import count, islice, product
 from typing import Any, NamedTuple
 
-from sqlalchemy import insert, select, update
+from sqlalchemy import func, insert, select, update
 
 from silo.api.wire import RELEASE_LABEL, ItemTexts
 from silo.bom.errors import ConflictError, ForbiddenError, NotFoundError, RejectedError
 from silo.bom.text import character_problem
-from silo_server.actors import Role, Scope
+from silo_server.actors import Actor, Role, Scope
 from silo_server.db.rows import insert_rows, one_of
 from silo_server.db.tables import (
     frozen_items,
@@ -149,6 +149,52 @@ def approvals_of(tx: Tx, release: Release) -> list[Approval]:
     row = release_approvals.c
     query = select(release_approvals).where(row.release_id == release.id).order_by(row.at)
     return [from_row(Approval, record) for record in tx.conn.execute(query)]
+
+
+class InReview(NamedTuple):
+    """A revision that waits for approval: of which item, who submitted it, and who approved it so far."""
+
+    part_number: str
+    name: str
+    label: str
+    comment: str
+    frozen_at: str
+    created_by: str
+    approved_by: Sequence[str]
+
+
+def reviews(tx: Tx) -> list[InReview]:
+    """Find all revisions in review, the oldest first."""
+    row, item, given = releases.c, items.c, release_approvals.c
+    shown = (row.id, item.part_number, item.name, row.label, row.comment, row.frozen_at, row.created_by)
+    query = select(*shown).join(items, item.id == row.item_id).where(row.status == "review").order_by(row.id)
+    found = tx.conn.execute(query).all()
+    of_them = select(given.release_id, given.username).where(
+        one_of(tx, given.release_id, {r.id for r in found})
+    )
+    approved: dict[int, list[str]] = {}
+    for release_id, username in tx.conn.execute(of_them.order_by(given.at)):
+        approved.setdefault(release_id, []).append(username)
+    return [InReview(*record[1:], approved_by=approved.get(record.id, [])) for record in found]
+
+
+def review_count(tx: Tx) -> int:
+    """Count the revisions in review."""
+    query = select(func.count()).select_from(releases).where(releases.c.status == "review")
+    return tx.conn.scalar(query) or 0
+
+
+def may_approve(tx: Tx, actor: Actor) -> bool:
+    """Report whether a user has the right to approve."""
+    row = users.c
+    return bool(tx.conn.scalar(select(row.approver).where(row.id == actor.user_id, row.active)))
+
+
+def reviews_for(tx: Tx, actor: Actor) -> list[InReview]:
+    """Find the reviews that wait for this user: who has the right to approve, and has not approved yet."""
+    if not may_approve(tx, actor):
+        return []
+    return [review for review in reviews(tx) if actor.username not in review.approved_by]
 
 
 def newest_release(tx: Tx, item: Item) -> Release | None:
@@ -359,9 +405,7 @@ def _in_review(tx: Tx, part_number: str, label: str) -> tuple[Item, Release]:
 
 
 def _check_right(tx: Tx) -> None:
-    row = users.c
-    may = tx.conn.scalar(select(row.approver).where(row.id == tx.actor.user_id, row.active))
-    if not may:
+    if not may_approve(tx, tx.actor):
         raise ForbiddenError(
             f"{tx.actor.username} may not approve; an admin gives that right on the page Users"
         )

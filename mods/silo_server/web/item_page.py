@@ -15,7 +15,7 @@ from dataclasses import dataclass, fields, replace
 from decimal import Decimal
 from functools import cache, cached_property
 from itertools import accumulate, islice
-from typing import Annotated, Any, NamedTuple, TypeVar
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar
 
 from fastapi import APIRouter, Depends, Query
 from starlette.responses import Response
@@ -49,7 +49,7 @@ from silo_server.services.product.flat import FlatRow, flatten, leaves_in
 from silo_server.services.product.graph import MAX_DEPTH, Graph, load_graph
 from silo_server.services.product.line_filter import found_parts, leading_to, sought
 from silo_server.services.product.parts import RolledItem, parts_of, some_parts
-from silo_server.services.product.rollup import roll_up_cost, roll_up_mass
+from silo_server.services.product.rollup import CostRollup, roll_up_cost, roll_up_mass
 from silo_server.services.product.summary import Summary
 from silo_server.services.product.summary_make import MOST_NAMED
 from silo_server.services.product.summary_read import (
@@ -90,7 +90,7 @@ class Look:
         the part number of an item that is shown beside the table.
     """
 
-    view: Annotated[str, Query(max_length=10)] = "tree"
+    view: Literal["tree", "flat"] = "tree"
     q: Annotated[str, Query(max_length=200)] = ""
     type: Annotated[str, Query(max_length=20)] = ""
     sort: Annotated[str, Query(max_length=20)] = ""
@@ -411,18 +411,16 @@ def _flat_keys(shown: ShownStructure) -> Mapping[str, Callable[[FlatRow], Any]]:
 router = APIRouter(include_in_schema=False)
 
 MOST_USES = 200
-# Some 400 sheets of paper.
-MOST_PRINTED = 20_000
 
 
-Asked = Annotated[Look, Depends()]
+AskedLook = Annotated[Look, Depends()]
 
 
 @router.get("/items/{part_number}")
 def item_page(
     call: Reader,
     part_number: str,
-    look: Asked,
+    look: AskedLook,
     used_from: Annotated[int, Query(ge=0, le=10_000_000)] = 0,
     revisions_before: Annotated[int, Query(ge=1, le=2**31 - 1)] = 2**31 - 1,
 ) -> Response:
@@ -488,19 +486,6 @@ def document_page(call: Reader, uuid: str) -> Response:
         document_json = told_of(tx, uuid)
         history, _ = revisions.list_revisions(tx, get_document(tx, document_json["id"]), PAGE_SIZE)
     return page(call, "document.html", file=document_json, revisions=history)
-
-
-@router.get("/items/{part_number}/print")
-def print_page(call: Reader, part_number: str, look: Asked) -> Response:
-    """Show the BOM for paper: all rows of the view on one page, with what a reader must know on top."""
-    with call.server.large_reads.enter():
-        with call.read() as tx:
-            item = get_item(tx, part_number, include_archived=True)
-            shown = structure_of(tx, item, look, MOST_PRINTED)
-            now = tx.stamp
-        path = f"/items/{segment(item.part_number)}"
-        values = {"item": item, "look": look, "at": look.address(path), "now": now, **shown}
-        return page(call, "print.html", **values)
 
 
 def structure_of(tx: Tx, item: Item, look: Look, size: int = PAGE_ROWS) -> dict[str, Any]:
@@ -570,12 +555,7 @@ class Totals:
         graph, found, parts, pieces = shown.graph, shown.found, shown.parts, shown.look.pieces
         leaves = leaves_in(graph, found)
         alone = set() if leaves is found else standing_alone(tx, graph)
-        whole = bought_whole(graph, parts)
-        costed = leaves_in(graph, found, whole) if whole else leaves
-        prices = prices_in(graph, parts, rates_of(tx), pieces)
-        lacking = {row.line.child_id for row in costed} - prices.keys()  # what is found in a bought assembly
-        prices |= {part_id: part_cost(parts[part_id], Decimal(1), rates_of(tx)) for part_id in lacking}
-        cost = roll_up_cost(costed, parts, prices, pieces)
+        cost = cost_of_found(shown, rates_of(tx))
         weighed = roll_up_mass(leaves_in(graph, found, alone) if alone else leaves, parts, alone)
         return cls(
             _times(pieces, as_decimal(weighed.total)) or None,
@@ -585,6 +565,16 @@ class Totals:
             sorted(weighed.missing)[:MOST_NAMED],
             sorted(cost.missing)[:MOST_NAMED],
         )
+
+
+def cost_of_found(shown: ShownStructure, rates: Mapping[str, Decimal]) -> CostRollup:
+    """Add up what all pieces of the found parts cost, at the prices of the whole product."""
+    graph, parts, pieces = shown.graph, shown.parts, shown.look.pieces
+    costed = leaves_in(graph, shown.found, bought_whole(graph, parts))
+    prices = prices_in(graph, parts, rates, pieces)
+    lacking = {row.line.child_id for row in costed} - prices.keys()  # what is found in a bought assembly
+    prices |= {part_id: part_cost(parts[part_id], Decimal(1), rates) for part_id in lacking}
+    return roll_up_cost(costed, parts, prices, pieces)
 
 
 PAGE_SIZE = 100

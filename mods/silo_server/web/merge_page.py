@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import Annotated, Any
 from urllib.parse import parse_qsl, urlencode
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Depends, Query
 from starlette.datastructures import FormData
 from starlette.responses import Response
 
@@ -110,12 +110,33 @@ def bom_path(part_number: str) -> str:
     return f"/items/{segment(part_number)}/bom"
 
 
-@router.get("/items/{part_number}/bom")
-def merge_page(call: Reader, part_number: str, edit: Annotated[str, Query(max_length=64)] = "") -> Response:
-    """Show unreferenced lines, conflicts, the last sync in plain words, and the lines; ``edit`` opens one.
+SHOWS: Mapping[str, tuple[str, Callable[[Line], bool]]] = {
+    "cad": (N_("from CAD"), lambda line: line.state.source == "assembly"),
+    "hand": (N_("by hand"), lambda line: line.state.source == "manual"),
+    "override": (N_("overridden here"), lambda line: line.state.override),
+    "unreferenced": (N_("unreferenced"), lambda line: line.state.unreferenced_since is not None),
+    "archived": (N_("archived items"), lambda line: line.child_archived),
+}
 
-    ``q``, ``show``, ``sort`` and ``page`` say which lines the table has (:func:`table_of`).
-    """
+
+@dataclass(frozen=True)
+class LineView:
+    """The part of the address that says which lines the table has (:func:`table_of`)."""
+
+    q: Annotated[str, Query(max_length=200)] = ""
+    show: Annotated[str, Query(pattern=f"^({'|'.join(SHOWS)})?$")] = ""
+    sort: Annotated[str, Query(max_length=20)] = ""
+    page: Annotated[int, Query(ge=1, le=10**7)] = 1
+
+
+@router.get("/items/{part_number}/bom")
+def merge_page(
+    call: Reader,
+    part_number: str,
+    _view: Annotated[LineView, Depends()],
+    edit: Annotated[str, Query(max_length=64)] = "",
+) -> Response:
+    """Show unreferenced lines, conflicts, the last sync in plain words, and the lines; ``edit`` opens one."""
     return _show(call, part_number, PageState(edit=edit, view=view_of(call.request.url.query)))
 
 
@@ -378,13 +399,6 @@ def _show(call: Call, part_number: str, asked: PageState, status: int = 200) -> 
     )
 
 
-SHOWS: Mapping[str, tuple[str, Callable[[Line], bool]]] = {
-    "cad": (N_("from CAD"), lambda line: line.state.source == "assembly"),
-    "hand": (N_("by hand"), lambda line: line.state.source == "manual"),
-    "override": (N_("overridden here"), lambda line: line.state.override),
-    "unreferenced": (N_("unreferenced"), lambda line: line.state.unreferenced_since is not None),
-    "archived": (N_("archived items"), lambda line: line.child_archived),
-}
 _SORTS: Mapping[str, Callable[[Line], Any]] = {
     "number": lambda line: line.child_part_number.casefold(),
     "name": lambda line: line.child_name.casefold(),

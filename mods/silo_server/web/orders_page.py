@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from starlette.datastructures import FormData
 from starlette.responses import Response
 
-from silo.bom.errors import RejectedError, SiloError, VersionConflictError
+from silo.bom.errors import NotFoundError, RejectedError, SiloError, VersionConflictError
 from silo.tables.price_rows import PRICES, PriceRows
 from silo.tables.sheet import Layout
 from silo_server.routes.call import Call
@@ -28,6 +28,7 @@ from silo_server.web.accounts import Administrator, Reader, Writer
 from silo_server.web.attachments import kind_words
 from silo_server.web.forms import Form, amount, back, back_to, problems_of, text, texts, whole
 from silo_server.web.import_page import Problem, Upload, carried, checked, layout_of, reading
+from silo_server.web.releases_page import STAMPS
 from silo_server.web.render import N_, PAGE_ROWS, Address, _, isolate, page, page_of, segment
 
 router = APIRouter(include_in_schema=False)
@@ -111,15 +112,18 @@ def order_page(
     """Show what to order for so many pieces; page 0 has all rows, for paper."""
     with call.server.large_reads.enter(), call.read() as tx:
         product = get_item(tx, part_number, include_archived=True)
-        labels = [
-            release.label
+        states = {
+            release.label: release.status
             for release in releases.list_releases(tx, product)
             if release.status in releases.NUMBERED
-        ]
+        }
+        draft = releases.coming_label(tx, product)
         recorded = orders.list_recorded(tx, product=product)
         problem, order_list = "", None
         try:
             order_list = orders.order_list(tx, part_number, asked)
+        except NotFoundError:
+            raise  # an unknown revision: the draft in its place would be ordered
         except SiloError as error:
             problem = str(error)
         now = tx.stamp
@@ -143,7 +147,9 @@ def order_page(
         spares=decimal_text(asked.spares),
         found=order_list,
         problem=problem,
-        labels=labels,
+        labels=list(states),
+        draft=draft,
+        stamp=STAMPS[states[asked.release] if asked.release else ""],
         recorded=recorded,
         at=at,
         now=now,

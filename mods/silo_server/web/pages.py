@@ -12,7 +12,7 @@ from typing import Any, cast
 from urllib.parse import quote
 
 import anyio.to_thread
-from fastapi import FastAPI, Request
+from fastapi import Depends, FastAPI, Request
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.responses import RedirectResponse, Response
 from starlette.routing import Match
@@ -22,6 +22,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from silo_server.actors import Actor
 from silo_server.http.headers import SECURITY_HEADERS
 from silo_server.routes.call import SAFE_METHODS, find_actor
+from silo_server.routes.known_parameters import refuse_unknown
 from silo_server.web import (
     accounts,
     activity_page,
@@ -31,16 +32,18 @@ from silo_server.web import (
     item_page,
     merge_page,
     orders_page,
+    print_page,
     releases_page,
     waiting_page,
 )
 from silo_server.web.accounts import LoginNeededError, OldFormError, send_again, to_login
-from silo_server.web.render import LANGUAGE, LANGUAGE_COOKIE, N_, _, language_for, page_for
+from silo_server.web.render import LANGUAGE, LANGUAGE_COOKIE, N_, NOTICE, _, language_for, page_for
 
 ROUTERS = (
     accounts.router,
     item_edit_page.router,  # before item_page: /items/new is no part number
     item_page.router,
+    print_page.router,
     attachments.router,
     merge_page.router,
     releases_page.router,
@@ -49,6 +52,8 @@ ROUTERS = (
     import_page.router,
     waiting_page.router,
 )
+# The notice of the form that led to a page is in its address.
+DEPENDENCIES = (Depends(refuse_unknown(NOTICE)),)
 
 
 class Spoken:

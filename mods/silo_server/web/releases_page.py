@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import suppress
 from itertools import islice
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query
 from starlette.responses import Response
@@ -39,6 +39,8 @@ router = APIRouter(include_in_schema=False)
 
 # No reader pages through more rows of a frozen tree; an export has all of them.
 MOST_ROWS = 20_000
+# What stands in large letters on paper, by the state of a revision; what is released needs no such word.
+STAMPS = {"": N_("DRAFT"), "review": N_("IN REVIEW"), "obsolete": N_("OBSOLETE"), "released": ""}
 ENDS = (N_("rejected"), N_("withdrawn"), N_("obsolete"))
 
 
@@ -136,7 +138,7 @@ def release_page(
     call: Reader,
     part_number: str,
     label: str,
-    view: Annotated[str, Query(max_length=10)] = "tree",
+    view: Literal["tree", "flat"] = "tree",
     number: Annotated[int, Query(alias="page", ge=1, le=10**9)] = 1,
 ) -> Response:
     """Show one revision as it was frozen: its tree, or the flat list with totals, and its files."""
@@ -157,6 +159,7 @@ def release_page(
     return page(
         call,
         "release.html",
+        stamp=STAMPS[release.status],
         item=product.graph.root,
         release=release,
         approvals=approvals,

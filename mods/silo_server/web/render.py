@@ -44,6 +44,7 @@ from silo_server.routes.call import Call, server_of
 from silo_server.routes.masked_secret import masked
 from silo_server.services.badge import badge
 from silo_server.services.bom.waiting import waiting_count
+from silo_server.services.releases import review_count
 from silo_server.times import wire_time
 
 # The key of a notice in the address of the page that shows it, and the cookies (one for each key) it is in.
@@ -394,14 +395,15 @@ _LINK = re.compile(r'(\s(?:href|src|action|formaction|data-events)=")/(?!/)')
 
 
 def _state(request: Request, waiting: int | None, actor: Actor | None) -> tuple[bool, int, int]:
-    """Read what each page shows: if no changes are taken, how many BOMs wait, how much for this person.
+    """Read what each page shows: if no changes are taken, how many BOMs and reviews wait, how much for this
+    user.
 
-    ``waiting``: the number of BOMs that wait, if the page has counted them. Without the database all of this
+    ``waiting``: how many wait, if the page has counted them. Without the database all of this
     is unknown; the page says so.
     """
     try:
         with server_of(request).db.read() as tx:
-            count = waiting_count(tx) if waiting is None else waiting
+            count = waiting_count(tx) + review_count(tx) if waiting is None else waiting
             return mode_of(tx) != "normal", count, badge(tx, actor) if actor else 0
     except SQLAlchemyError:
         return False, 0, 0

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""All BOMs that wait for a decision, by project folder, with one decision for many of them.
+"""All that waits: revisions in review, and the BOMs with something open, by project folder, with one decision
+for many of them.
 
-What waits for the person who looks: the open BOMs that are theirs, and the news of what they follow.
+What waits for the user who looks: reviews to approve, the open BOMs that are theirs, and the news of what
+they follow.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ from silo_server.services.bom.decisions import ReviewAction, decide_all, lines_f
 from silo_server.services.bom.restore import undo_change
 from silo_server.services.bom.waiting import Waiting, waiting
 from silo_server.services.following import have_seen
+from silo_server.services.releases import review_count, reviews, reviews_for
 from silo_server.services.scene import with_model
 from silo_server.services.search import fits
 from silo_server.values import Line
@@ -66,7 +69,7 @@ def waiting_page(
     call: Reader,
     q: Annotated[str, Query(max_length=200)] = "",
     folder: Annotated[str, Query(max_length=1024)] = "",
-    kind: Annotated[str, Query(max_length=20)] = "",
+    kind: Annotated[str, Query(pattern=f"^({'|'.join(KINDS)})?$")] = "",
     who: Annotated[str, Query(max_length=64)] = "",
     sort: Annotated[str, Query(max_length=20)] = "",
     number: Annotated[int, Query(ge=1, le=10**7, alias="page")] = 1,
@@ -152,11 +155,13 @@ def mine_page(call: Reader) -> Response:
     with call.read() as tx:
         rows = waiting(tx)
         subjects = following.followed(tx, call.actor)
+        own_reviews, in_review = reviews_for(tx, call.actor), review_count(tx)
     followed = {subject.folder for subject in subjects}
     return page(
         call,
         "mine.html",
-        waiting=len(rows),
+        waiting=len(rows) + in_review,
+        reviews=own_reviews,
         rows=[row for row in rows if row.assignee == call.actor.username],
         found=subjects,
         open_of=_open_of,
@@ -239,7 +244,7 @@ def _show(
     changes: Sequence[int] = (),
 ) -> Response:
     with call.read() as tx:
-        rows, people = waiting(tx), editors(tx)
+        rows, people, in_review = waiting(tx), editors(tx), reviews(tx)
     who = view.get("who", "")
     folders = Counter(part for row in rows for part in _folders(row.folder))
     test, kind, folder = fits(view.get("q", "")), KINDS.get(view.get("kind", "")), view.get("folder", "")
@@ -262,7 +267,8 @@ def _show(
         at=Address("/waiting", view),
         table=table,
         drawn=drawn,
-        waiting=len(rows),
+        waiting=len(rows) + len(in_review),
+        reviews=in_review,
         view=view,
         sort=view.get("sort", ""),
         folders=sorted(folders.items()),

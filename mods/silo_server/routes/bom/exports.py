@@ -14,11 +14,13 @@ from starlette.responses import Response
 from silo_server.db.transaction import Tx
 from silo_server.routes.bom import bom_router
 from silo_server.routes.call import Call, Viewer
+from silo_server.routes.known_parameters import refuse_unknown
 from silo_server.routes.made_files import CSV, XLSX, content_of, file_of
 from silo_server.services.product.export import Export, View, export
 from silo_server.services.product.export_files import to_csv, to_json, to_xlsx
 
 router = bom_router("bom transfer")
+router.dependencies.append(Depends(refuse_unknown()))
 
 
 @dataclass(frozen=True)

@@ -50,3 +50,16 @@ def expand(graph: Graph, depth: int, limit: int) -> Iterator[Occurrence]:
                 f"the expanded BOM of {graph.root.part_number} has more than {limit} lines; "
                 "ask for less with depth="
             )
+
+
+def levels_of(graph: Graph) -> list[int]:
+    """Count the rows of each level of the expanded tree. Raises CycleError."""
+    below: dict[int, list[int]] = {}
+    for item_id in reversed(order_of(graph)):
+        counts = [len(graph.lines.get(item_id, ()))]
+        for line in graph.components(item_id):
+            for depth, count in enumerate(below.get(line.child_id, ()), start=1):
+                counts += [0] * (depth + 1 - len(counts))
+                counts[depth] += count
+        below[item_id] = counts if counts[0] else []
+    return below[graph.root.id]
