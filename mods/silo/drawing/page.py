@@ -242,6 +242,7 @@ def _data(report: InertiaReport, views: Sequence[LinkView], shapes: bool) -> dic
     return {
         "name": report.assembly or "the assembly",
         "facts": list(_facts(report)),
+        "sum": report.reconciliation.sentence if report.reconciliation is not None else "",
         "shapes": shapes,
         "views": [
             {

@@ -53,6 +53,7 @@ const kilograms = (value) => (value > 0 && value < 1 ? digits(4)(value * 1e3) + 
 const vector = (values) => values.map((v) => (v === null ? "not finite" : digits(5)(v))).join("  ");
 
 document.title = by("title").textContent = "Mass properties of " + data.name;
+by("sum").textContent = data.sum;
 by("facts").textContent = data.facts.join(" · ");
 
 // ---- tables

@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from silo.bom.errors import InputError
+from silo.bom.message import Message
 from silo.inertia.assembly import Assembly, Prototype
 from silo.inertia.bom.mass_cell import parse_mass
 from silo.inertia.bom.table import BOMEntry, BomTable
@@ -20,6 +20,7 @@ from silo.inertia.checks import (
     check_other_links,
     check_rows,
     check_tensors,
+    pieces_of_rows,
 )
 from silo.inertia.links.claims import ROOT_LINK, Claims, claim
 from silo.inertia.links.frames import FrameChoice, LinkFrame
@@ -27,17 +28,17 @@ from silo.inertia.links.link_map import as_link_map
 from silo.inertia.links.patterns import components
 from silo.inertia.links.starting_map import word_of
 from silo.inertia.masses import MassRule, place_all, weighed
-from silo.inertia.matching import match
+from silo.inertia.matching import Matching, match
 from silo.inertia.materials.material import MaterialHit
 from silo.inertia.materials.table import MaterialTable
 from silo.inertia.names import Suggester
+from silo.inertia.notes import GeometryCode
 from silo.inertia.products import leaf_products, sub_assemblies
+from silo.inertia.reconciliation import reconciled
 from silo.inertia.report import InertiaReport
 from silo.inertia.results import fill_links
 from silo.inertia.task import Task
-
-if TYPE_CHECKING:
-    pass
+from silo.inertia.unit_doubts import meant_unit
 
 
 def calculate(assembly: Assembly, table: BomTable | None, task: Task | None = None) -> InertiaReport:
@@ -97,12 +98,28 @@ def calculate_claims(
         report.add_warning("", "", problem.message, problem.code)
     for doubt in doubts:
         report.add_warning("", "", doubt.message, doubt.code)
+    if (unit := _meant_unit(assembly, rule, matching)) is not None:
+        report.add_warning("", "", unit, GeometryCode.UNITS)
     fill_links(report, assembly, placed, claims, task.frame)
+    if table is not None:
+        pieces = pieces_of_rows(leaves, groups, matching)
+        report.reconciliation = reconciled(assembly, table, matching, placed, pieces)
     if task.simulated:
         check_tensors(report)
     check_claims(report, assembly, claims)
-    check_rows(report, leaves, groups, matching)
+    check_rows(report, leaves, groups, matching, rows)
     return report
+
+
+def _meant_unit(assembly: Assembly, rule: MassRule, matching: Matching) -> Message | None:
+    masses = []
+    for key, found in matching.parts.items():
+        prototype = assembly.prototypes.get(key)
+        if prototype is not None and found.row.mass_kg is not None:
+            stated = rule.density_of(found.row.material)
+            density = stated if stated is not None else prototype.step_density
+            masses.append((found.row.mass_kg, prototype.volume_m3, density))
+    return meant_unit(assembly.prototypes, masses)
 
 
 def _weights(task: Task, assembly: Assembly, claims: Claims) -> list[tuple[str, Sequence[int], float]]:

@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from silo.inertia.assembly import Assembly
+from silo.inertia.bom.table import BomTable
 from silo.inertia.codes import MassCode
 from silo.inertia.links.claims import Claims, chosen_frame
 from silo.inertia.links.frames import FrameChoice, apart
-from silo.inertia.matching import Matching
+from silo.inertia.matching import Match, Matching
 from silo.inertia.names import plain
 from silo.inertia.products import Product
+from silo.inertia.reconciliation import unused_kg
 from silo.inertia.report import InertiaReport
 from silo.inertia.rigid import TensorProblem, tensor_words
 from silo.inertia.task import Task
@@ -148,8 +150,32 @@ def _check_rooted(report: InertiaReport, assembly: Assembly, claims: Claims) -> 
             report.add_warning(root, part.name, words, MassCode.IN_ROOT_LINK)
 
 
+def pieces_of_rows(
+    leaves: Sequence[Product], groups: Sequence[Product], matching: Matching
+) -> dict[int, int]:
+    """Count the pieces that the geometry has of each matched row, by the row's identity."""
+    counted: dict[int, int] = {}
+    for product, found in _matched(leaves, groups, matching):
+        if found is not None:
+            counted[id(found.row)] = counted.get(id(found.row), 0) + product.count
+    return counted
+
+
+def _matched(
+    leaves: Sequence[Product], groups: Sequence[Product], matching: Matching
+) -> list[tuple[Product, Match | None]]:
+    return [
+        *((product, matching.parts.get(product.key)) for product in leaves),
+        *((product, matching.groups.get(product.key)) for product in groups),
+    ]
+
+
 def check_rows(
-    report: InertiaReport, leaves: Sequence[Product], groups: Sequence[Product], matching: Matching
+    report: InertiaReport,
+    leaves: Sequence[Product],
+    groups: Sequence[Product],
+    matching: Matching,
+    table: BomTable,
 ) -> None:
     """Warn of BOM rows that no part uses, and rows whose quantity is not the number of parts."""
     names = {plain(product.name) for product in (*leaves, *groups)}
@@ -163,15 +189,10 @@ def check_rows(
             row.name,
             f"BOM line {row.line}{quantity}: {why}; its mass is not counted",
             MassCode.ROW_UNUSED,
+            unused_kg(table, row),
         )
-    counted: dict[int, int] = {}
-    products = [
-        *((product, matching.parts.get(product.key)) for product in leaves),
-        *((product, matching.groups.get(product.key)) for product in groups),
-    ]
-    for product, rows in products:
-        if rows is not None:
-            counted[id(rows.row)] = counted.get(id(rows.row), 0) + product.count
+    counted = pieces_of_rows(leaves, groups, matching)
+    products = _matched(leaves, groups, matching)
     shown_rows: set[int] = set()
     for product, rows in products:
         if rows is None or id(rows.row) in shown_rows:
@@ -186,4 +207,5 @@ def check_rows(
                 f"the BOM has {said} of it (line {rows.row.line}), the geometry {count}; "
                 "the geometry's pieces were counted",
                 MassCode.COUNT_DIFFERS,
+                min(abs(quantity - count) for quantity in wanted) * (rows.row.mass_kg or 0.0) or None,
             )

@@ -347,6 +347,7 @@ def _rounding(given: GivenMass) -> Iterator[Note]:
         yield Note(
             MassCode.ROUNDED,
             f"the BOM's {mass:.6g} kg is rounded to ± {quantum:.3g} kg ({quantum / mass:.0%})",
+            quantum,
         )
 
 
@@ -381,6 +382,7 @@ def _against(given: GivenMass, volume: float, expected: Expectation) -> Iterator
         MassCode.DIFFERS,
         f"the BOM says {given.kg:.6g} kg, but {expected.words} times the volume gives {weight:.6g} kg "
         f"({weight / given.kg - 1:+.0%}); the BOM's mass was used",
+        abs(weight - given.kg),
     )
 
 
@@ -433,6 +435,7 @@ def density_doubts(prototype: Prototype, used: Material) -> Iterator[Note]:
             MassCode.DENSITY_VARIES,
             f"{used.name} has from {low:.4g} to {high:.4g} kg/m³, by its kind; {density:g} kg/m³ were used, "
             f"so the mass is ± {used.spread:.0%}",
+            used.spread * density * prototype.volume_m3,
         )
     if stated is not None and abs(stated - density) > max(MISMATCH_LIMIT, used.spread) * density:
         material = f" ({prototype.step_material})" if prototype.step_material else ""
@@ -440,6 +443,7 @@ def density_doubts(prototype: Prototype, used: Material) -> Iterator[Note]:
             MassCode.STEP_DENSITY,
             f"the file states {stated:g} kg/m³{material}, "
             f"{used.name} has {density:g} kg/m³; the BOM's material was used",
+            abs(stated - density) * prototype.volume_m3,
         )
 
 

@@ -56,7 +56,12 @@ DOUBTFUL = (
 @dataclass(frozen=True)
 class Note:
     """One thing that was noticed: a sentence, and one of :class:`GeometryCode`, of the other codes, or a
-    reader's own word."""
+    reader's own word.
+
+    kg
+        by how much the mass of one piece may be wrong [kg]; None: by all of it.
+    """
 
     code: str
     message: str
+    kg: float | None = None

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -14,11 +15,15 @@ from silo.inertia.codes import Decided, MassCode, Rule, Source
 
 if TYPE_CHECKING:
     from silo.inertia.links.frames import LinkFrame
+    from silo.inertia.reconciliation import Reconciliation
     from silo.inertia.rigid import MassProps, TensorProblem
     from silo.inertia.types import InertialProperties
 
 
 logger = logging.getLogger(__name__)
+
+HEAVY = 0.05
+"""Of the robot: a row without geometry that weighs as much comes first."""
 
 NO_CODE = "note"
 """The code of a warning that a caller adds without one."""
@@ -36,12 +41,17 @@ MISSING_MASS = (
 
 @dataclass(frozen=True)
 class PartWarning:
-    """A warning about one part of one link; ``link_name`` or ``part_name`` is "" if it is about none."""
+    """A warning about one part of one link; ``link_name`` or ``part_name`` is "" if it is about none.
+
+    kg
+        by how much the mass may be wrong [kg]; None: by all of the part, or of the link.
+    """
 
     link_name: str
     part_name: str
     message: str
     code: str = NO_CODE
+    kg: float | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True)
@@ -67,6 +77,8 @@ class PartResult:
         BOM lines it came from.
     products
         keys of the prototypes it stands for: one, or several that are alike.
+    reach
+        mean distance [m] of the pieces from the centre of mass of the whole assembly.
     """
 
     name: str
@@ -85,6 +97,7 @@ class PartResult:
     part_number: str = ""
     lines: tuple[int, ...] = ()
     products: tuple[str, ...] = ()
+    reach: float = 0.0
     warnings: tuple[PartWarning, ...] = ()
 
     @property
@@ -138,11 +151,18 @@ class LinkResult:
 
 @dataclass(frozen=True)
 class Cause:
-    """All warnings of one code, the heaviest part's first; ``mass`` [kg] of the parts and links concerned."""
+    """All warnings of one code, the one with the largest effect first.
+
+    mass
+        by how much [kg] the sum may be wrong.
+    effect
+        the larger of that and of its moment about the centre of mass, each as a share of the whole's.
+    """
 
     code: str
     mass: float
     warnings: tuple[PartWarning, ...]
+    effect: float = 0.0
 
 
 @dataclass(repr=False)
@@ -159,6 +179,8 @@ class InertiaReport:
         those that the BOM gives a mass.
     total
         the whole assembly in its own frame, unclaimed parts included; None before a calculation.
+    reconciliation
+        the BOM's sum beside the sum that was counted; None without a BOM.
     assembly, source, bom
         name and file of the geometry, file of the BOM ("" without one).
     """
@@ -173,31 +195,63 @@ class InertiaReport:
     source: str = ""
     bom: str = ""
     default_density: float = 1000.0
+    reconciliation: Reconciliation | None = None
     _told: set[PartWarning] = field(default_factory=set, init=False, repr=False, compare=False)
 
-    def add_warning(self, link_name: str, part_name: str, message: str, code: str = NO_CODE) -> None:
+    def add_warning(
+        self, link_name: str, part_name: str, message: str, code: str = NO_CODE, kg: float | None = None
+    ) -> None:
         """Add a warning; equal warnings are kept once."""
-        warning = PartWarning(link_name, part_name, message, code)
+        warning = PartWarning(link_name, part_name, message, code, kg)
         if warning not in self._told:
             self._told.add(warning)
             self.warnings.append(warning)
 
     def causes(self) -> list[Cause]:
-        """Group the warnings by code; the cause that concerns the most mass comes first."""
+        """Group the warnings by code; the cause with the largest effect on mass or moment comes first.
+
+        Rows without geometry that weigh a twentieth of the robot come before all others.
+        """
         masses: dict[tuple[str, str], float] = defaultdict(float)
+        reaches: dict[tuple[str, str], float] = defaultdict(float)
         for link in self.links.values():
             masses[link.name, ""] = link.props.mass
         for name, part in self.parts():
             masses[name, part.name] += part.total_mass
+            reaches[name, part.name] = max(reaches[name, part.name], part.reach)
+        whole, gyration = self._size()
+
+        def at_stake(warning: PartWarning) -> float:
+            mass = masses.get((warning.link_name, warning.part_name), 0.0)
+            return mass if warning.kg is None else warning.kg
+
+        def effect(warning: PartWarning) -> float:
+            reach = reaches.get((warning.link_name, warning.part_name), 0.0)
+            return at_stake(warning) / whole * max(1.0, reach / gyration)
+
         groups: dict[str, list[PartWarning]] = defaultdict(list)
-        for warning in sorted(self.warnings, key=lambda w: -masses.get((w.link_name, w.part_name), 0.0)):
+        for warning in sorted(self.warnings, key=lambda warning: -effect(warning)):
             groups[str(warning.code)].append(warning)
         causes = []
         for code, warnings in groups.items():
-            places = {(w.link_name, w.part_name) for w in warnings}
-            at_stake = sum(masses.get(place, 0.0) for place in places)
-            causes.append(Cause(code, at_stake, tuple(warnings)))
-        return sorted(causes, key=lambda cause: -cause.mass)
+            worst: dict[tuple[str, str], PartWarning] = {}
+            for warning in warnings:  # the largest effect of a place comes first
+                worst.setdefault((warning.link_name, warning.part_name), warning)
+            mass = sum(map(at_stake, worst.values()))
+            causes.append(Cause(code, mass, tuple(warnings), sum(map(effect, worst.values()))))
+
+        def rank(cause: Cause) -> tuple[bool, float]:
+            missing = cause.code == MassCode.ROW_UNUSED and cause.mass >= HEAVY * whole
+            return (not (missing and cause.mass > 0), -cause.effect)
+
+        return sorted(causes, key=rank)
+
+    def _size(self) -> tuple[float, float]:
+        """Return the mass [kg] and the radius of gyration [m] of the whole; 1 for what is not known."""
+        if self.total is None or not self.total.mass > 0:
+            return 1.0, 1.0
+        radius = math.sqrt(max(float(self.total.inertia.trace()), 0.0) / 2 / self.total.mass)
+        return self.total.mass, radius or 1.0
 
     def get_summary(self) -> str:
         """Write all warnings, link by link: first the parts whose mass is missing, in the spec's words."""

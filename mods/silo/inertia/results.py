@@ -31,19 +31,19 @@ def fill_links(
     report: InertiaReport, assembly: Assembly, placed: Placed, claims: Claims, choice: FrameChoice
 ) -> None:
     """Put every link and the unclaimed parts into the report, warnings included."""
+    total = sum_up(placed, range(len(assembly.instances)))
     for name, indices in claims.members.items():
         frame = chosen_frame(name, claims, choice)
         words = frame.description if frame is ASSEMBLY_FRAME else f"{frame.description} ({name})"
         props = sum_up(placed, indices).transformed(frame.inverse(), words)
-        parts = tuple(_parts(assembly, placed, indices, name))
+        parts = tuple(_parts(assembly, placed, indices, name, total.com))
         link = LinkResult(name, props, frame, parts, props.check())
         report.links[name] = link
         report.link_properties[name] = props.to_inertial()
         _part_warnings(report, parts)
-    report.unclaimed = tuple(_parts(assembly, placed, claims.unclaimed, ""))
+    report.unclaimed = tuple(_parts(assembly, placed, claims.unclaimed, "", total.com))
     _part_warnings(report, report.unclaimed)
     report.sub_assemblies = tuple(_sub_assemblies(assembly, placed))
-    total = sum_up(placed, range(len(assembly.instances)))
     report.total = replace(total, frame=ASSEMBLY_FRAME.description)
 
 
@@ -84,7 +84,9 @@ def _shape(assembly: Assembly, placed: Placed, occurrence: PlacedAssembly) -> tu
     return volume, props.transformed(LinkFrame(frame, "").inverse()).com
 
 
-def _parts(assembly: Assembly, placed: Placed, indices: Iterable[int], link: str) -> Iterator[PartResult]:
+def _parts(
+    assembly: Assembly, placed: Placed, indices: Iterable[int], link: str, middle: Floats
+) -> Iterator[PartResult]:
     """Group the pieces with the same name, size, mass and source of mass, even if they are different
     products.
 
@@ -98,10 +100,12 @@ def _parts(assembly: Assembly, placed: Placed, indices: Iterable[int], link: str
             key = (product.name, product.part_number, product.problems, placed.decisions[index], *size)
             groups.setdefault(key, []).append(index)
     for members in groups.values():
-        yield _part(assembly, placed, members, link)
+        yield _part(assembly, placed, members, link, middle)
 
 
-def _part(assembly: Assembly, placed: Placed, members: Sequence[int], link: str) -> PartResult:
+def _part(
+    assembly: Assembly, placed: Placed, members: Sequence[int], link: str, middle: Floats
+) -> PartResult:
     instances = [assembly.instances[index] for index in members]
     products = [assembly.prototypes[key] for key in dict.fromkeys(i.prototype for i in instances)]
     product, decision = products[0], placed.decisions[members[0]]
@@ -126,11 +130,23 @@ def _part(assembly: Assembly, placed: Placed, members: Sequence[int], link: str)
         part_number=decision.part_number or product.part_number or "",
         lines=decision.lines,
         products=tuple(p.key for p in products),
-        warnings=tuple(PartWarning(link, product.name, note.message, note.code) for note in notes),
+        reach=float(np.mean(np.linalg.norm(placed.com[list(members)] - middle, axis=1))),
+        warnings=tuple(
+            PartWarning(
+                link,
+                product.name,
+                note.message,
+                note.code,
+                None if note.kg is None else note.kg * len(members),
+            )
+            for note in notes
+        ),
     )
 
 
 def _part_warnings(report: InertiaReport, parts: Iterable[PartResult]) -> None:
     for part in parts:
         for warning in part.warnings:
-            report.add_warning(warning.link_name, warning.part_name, warning.message, warning.code)
+            report.add_warning(
+                warning.link_name, warning.part_name, warning.message, warning.code, warning.kg
+            )

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
+from silo.inertia.reconciliation import Difference, Reconciliation
 from silo.inertia.report import InertiaReport, LinkResult, PartResult
 from silo.inertia.rigid import MassProps
 
@@ -18,6 +19,7 @@ def report_data(report: InertiaReport) -> dict[str, Any]:
         "format": FORMAT,
         "assembly": {"name": report.assembly, "source": report.source},
         "bom": report.bom or None,
+        "reconciliation": _reconciliation(report.reconciliation),
         "default_density": report.default_density,
         "links": [_link(link) for link in report.links.values()],
         "unclaimed": [_part(part) for part in report.unclaimed],
@@ -31,6 +33,22 @@ def report_data(report: InertiaReport) -> dict[str, Any]:
             for w in report.warnings
         ],
     }
+
+
+def _reconciliation(found: Reconciliation | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    return {
+        "bom": found.bom,
+        "counted": found.counted,
+        "not_counted": [_difference(one) for one in found.not_counted],
+        "double": [_difference(one) for one in found.double],
+        "message": found.sentence,
+    }
+
+
+def _difference(one: Difference) -> dict[str, Any]:
+    return {"name": one.name, "mass": one.kg, "reason": one.reason}
 
 
 def report_json(report: InertiaReport, encoding: str = "utf-8") -> str:

@@ -25,6 +25,8 @@ def report_markdown(report: InertiaReport) -> str:
     """Write the report as Markdown."""
     out = [f"# Mass properties of {_cell(report.assembly or 'the assembly')}", ""]
     out += [f"Geometry: {_cell(report.source)}  ", f"BOM: {_cell(report.bom) or 'none'}", ""]
+    if report.reconciliation is not None:
+        out += [_cell(report.reconciliation.sentence), ""]
     out += ["## Links", "", *_link_rows(report), "", *_frames(report), ""]
     out += ["## Parts", "", *_part_rows(report), ""]
     if report.unclaimed:

@@ -34,7 +34,8 @@ def report_tables(report: InertiaReport, *, whole: bool = False, say: Say = str)
     ``whole``: all rows, each on one line, for a pipe.
     """
     tables = (_links_table(report, say, whole=whole), _parts_table(report, say, whole=whole))
-    return Group(tables[0], Text(), tables[1], Text(), report_warnings(report, whole=whole, say=say))
+    head = [Text(clean(say(report.reconciliation.sentence))), Text()] if report.reconciliation else []
+    return Group(*head, tables[0], Text(), tables[1], Text(), report_warnings(report, whole=whole, say=say))
 
 
 def _table(title: str, headings: Iterable[str], say: Say) -> Table:
