@@ -224,6 +224,7 @@ SCENES: dict[FindingCode, Callable[[], Iterable[Finding]]] = {
     FindingCode.TWO_ROLES: two_roles,
     FindingCode.UNEXPLAINED: unexplained,
     FindingCode.EMPTY_BOM: lambda: extract(Doc("/v/top.FCStd").assembly()).findings,
+    FindingCode.ONE_PART: lambda: extract(choose_assembly(Doc("/v/top.FCStd").body().Document)).findings,
     FindingCode.COPIED_IDENTITY: lambda: one_identity(("/v/a.FCStd", "A"), ("/v/b.FCStd", "B")),
     FindingCode.SHARED_IDENTITY: lambda: one_identity(("/v/a.FCStd", "A"), ("/v/a.FCStd", "B")),
     FindingCode.CONSOLIDATION: lambda: consolidation_findings(extract(Scene().sub).entries),

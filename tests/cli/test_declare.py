@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fcstd_writer import Doc, locals_, part
+from fcstd_writer import Doc, Raw, locals_, part
 
 from silo.fcstd import open_document
 
@@ -106,3 +106,68 @@ def test_what_a2plus_imported_joins_the_item_of_its_file(run: Any, silo: Any, tm
     registered = {one["silo_uuid"]: one["part_number"] for one in done["registered"]}
     identity = open_document(source).Meta["SiloUUID"]
     assert (row["quantity"], row["part_number"]) == (2, registered[identity])
+
+
+@pytest.fixture
+def looked_into(tmp_path: Path) -> Path:
+    """A case with a hidden terminal, a hidden link and a link that only supports a binder."""
+    part("plate", "Box").save(tmp_path / "plate.FCStd")
+    doc = Doc(label="case").add("PartDesign::Body", "Case")
+    doc.add("PartDesign::Body", "Terminal", Visibility=False, Label="Terminal +")
+    for name in ("Quiet", "Ref"):
+        doc.link(name, "plate.FCStd", "Box", Visibility=False)
+    support = Raw(
+        "App::PropertyXLinkSubList",
+        '<XLinkSubList count="1"><XLink name="Ref" sub="Face1"/></XLinkSubList>',
+    )
+    doc.add("PartDesign::SubShapeBinder", "Binder", Support=support)
+    names = locals_("Case", "Terminal", "Quiet", "Ref", "Binder")
+    doc.add("App::Part", "Top", Group=names, Type="Assembly")
+    return doc.save(tmp_path / "case.FCStd")
+
+
+def pieces(run: Any, top: Path) -> tuple[int, set[str], dict[str, str]]:
+    """Linked pieces, own parts, and the standing of each hidden object."""
+    found = run("bom", top, "--json").json()
+    hidden = {
+        place["object"]: place["standing"]
+        for finding in found["findings"]
+        if finding["code"] == "hidden"
+        for place in finding["where"]
+    }
+    own = found["assembly"].get("own", found.get("own", []))
+    return sum(row["quantity"] for row in found["entries"]), {row["object"] for row in own}, hidden
+
+
+def test_each_hidden_object_counts_or_not_by_one_word(run: Any, looked_into: Path) -> None:
+    """The file keeps each answer, and nobody is asked about it again."""
+    before = {"Terminal": "not counted", "Quiet": "counts", "Ref": "reference"}
+    assert pieces(run, looked_into) == (1, {"Case"}, before)
+    done = run("register", looked_into, "--count", "Terminal +", "--count", "Ref", "--json")
+    assert (done.code, done.json()) == (0, {"counted": ["Terminal", "Ref"], "references": []})
+    counting = dict.fromkeys(before, "counts")
+    assert pieces(run, looked_into) == (2, {"Case", "Terminal"}, counting)
+    done = run("register", looked_into, "--reference", "Quiet", "--reference", "Terminal")
+    assert (done.code, "counts nowhere: Terminal +" in done.out) == (0, False)
+    assert "Quiet, Terminal +" in done.out
+    assert pieces(run, looked_into) == (1, {"Case"}, {"Ref": "counts"})
+    assert run("register", looked_into, "--count", "Quiet").code == 0
+    assert "says so already" in run("register", looked_into, "--count", "Quiet").out
+    assert pieces(run, looked_into)[0] == 2
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--count", "Case"),
+        ("--reference", "Nothing"),
+        ("--count", "Quiet", "--reference", "Quiet"),
+        ("--count", "Quiet", "--declare", "Case"),
+    ],
+)
+def test_a_wrong_answer_about_hidden_objects_changes_nothing(
+    run: Any, looked_into: Path, words: tuple[str, ...]
+) -> None:
+    before = looked_into.read_bytes()
+    assert run("register", looked_into, *words).code == 2
+    assert looked_into.read_bytes() == before

@@ -12,23 +12,17 @@ import os
 import secrets
 from collections import Counter
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
-from freecad_cases import answers, machines
+from freecad_cases import answers, machines, weighing
 from freecad_cases.machines import WANTED, FreeCAD
 
 from silo.bom.entry import Extraction
 from silo.bom.errors import SiloError
 from silo.bom.findings import FindingCode
 from silo.bom.view.flat_list import flat_lines
-from silo.fcstd import Library
 from silo.freecads.run import run_freecad
-from silo.inertia.geometry.fcstd import Entries, StoredFacts, Unpacked, measured_files
-from silo.inertia.geometry.freecad import Leaf, Walk, assembled, one_by_one
-from silo.inertia.geometry.measured import Measured
-from silo.inertia.geometry.options import ReadOptions
 
 pytestmark = pytest.mark.freecad
 
@@ -53,25 +47,7 @@ def counted(found: Extraction) -> dict[str, int]:
 
 def weighed(top: Path) -> dict[str, int]:
     """Volume → solids, of all pieces whose mass counts."""
-    entries = Entries()
-    solids: list[list[str]] = []
-    options = ReadOptions(eps=1e-6, mesh_check=False)
-    with Library() as library, TemporaryDirectory() as folder:
-        document = library.open(top)
-        walk = Walk(StoredFacts(entries))
-        shapes = Unpacked(entries, Path(folder))
-
-        def measure(leaf: Leaf) -> Measured:
-            found = measured_files(shapes.files(leaf), options.eps, options.mesh_check)
-            assert isinstance(found, Measured), found
-            solids.append([str(round(one.volume_m3 * 1e9)) for one in found.solids])
-            return found
-
-        quiet = lambda _stage, _number, _total: None  # noqa: E731
-        whole = assembled(walk, walk.top(document, None), str(top), options, one_by_one(measure), quiet)
-    entries.close()
-    of = dict(zip(dict.fromkeys(one.prototype for one in whole.instances), solids, strict=True))
-    pieces = Counter(volume for one in whole.instances for volume in of[one.prototype])
+    pieces = weighing.weighed(top, lambda volume: str(round(volume)))
     return {volume: pieces[volume] for volume in VOLUMES.values() if pieces[volume]}
 
 

@@ -284,6 +284,7 @@ class Desk:
     previews: list[PreviewWindow] = field(default_factory=list)
     witnessed: list[Any] = field(default_factory=list)
     relinked: list[str] = field(default_factory=list)
+    answers: list[tuple[tuple[str, ...], bool]] = field(default_factory=list)
     taken_back: list[tuple[str, ...]] = field(default_factory=list)
     refusal: SiloError | None = None
     registers: list[RegisterWindow] = field(default_factory=list)
@@ -308,6 +309,12 @@ class Desk:
         if self.refusal is not None:
             raise self.refusal
         return [f"{len(doc.parts)} in {assembly or doc.Label}", *(name for _, name in parts)]
+
+    def write_answer(self, doc: Any, names: Collection[str], *, counts: bool) -> list[str]:
+        if self.refusal is not None:
+            raise self.refusal
+        self.answers.append((tuple(names), counts))
+        return list(names)
 
     def relink(self, finding: Finding) -> list[str]:
         if self.refusal is not None:

@@ -9,7 +9,7 @@ file must never read as "removed".
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Self
 
@@ -231,7 +231,8 @@ class FindingCode(StrEnum):
         "hidden",
         _I,
         "hidden pieces, counted or not",
-        "set `SiloBomExclude` on an object: false counts it, true leaves it out; the file keeps the answer",
+        "*Count It* or *Reference* in the preview; `silo-mod register TOP.FCStd --count OBJECT`, `--reference"
+        " OBJECT`. The file keeps the answer (`SiloBomExclude`)",
         "Hidden in {obj}: {what}.",
     )
     MODIFIED_HERE = (
@@ -337,6 +338,13 @@ class FindingCode(StrEnum):
         "nothing, if the assembly is empty; else see which parts the other findings leave out",
         "{obj} holds no components that are linked from other files, so its BOM is empty.",
     )
+    ONE_PART = (
+        "one_part",
+        _I,
+        "a file that is one part, and no assembly",
+        "nothing; a part has no BOM of its own",
+        "{file} is one part and no assembly: it counts as one piece, with all that it shows ({names}).",
+    )
     NO_ROLE = (
         "no_role",
         _E,
@@ -404,12 +412,26 @@ class FindingCode(StrEnum):
     )
 
 
+class Standing(StrEnum):
+    """What the count makes of a hidden object."""
+
+    COUNTS = "counts"
+    NOT_COUNTED = "not counted"
+    REFERENCE = "reference"
+
+
 @dataclass(frozen=True, slots=True, order=True)
 class Place:
-    """An object in a file; ``doc_path`` as the document names itself, ``obj`` its FreeCAD ``Name``."""
+    """An object in a file; ``doc_path`` as the document names itself, ``obj`` its FreeCAD ``Name``.
+
+    label, standing
+        of a hidden object: its label, and what the count makes of it.
+    """
 
     doc_path: str
     obj: str = ""
+    label: str = field(default="", compare=False)
+    standing: str = field(default="", compare=False)
 
     def __str__(self) -> str:
         return f"{self.doc_path}#{self.obj}" if self.obj else self.doc_path

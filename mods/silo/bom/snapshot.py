@@ -107,7 +107,10 @@ def _plain_finding(finding: Finding) -> dict[str, Any]:
         "severity": finding.severity.value,
         "message": finding.message,
         **beside(finding.message),
-        "where": [[place.doc_path, place.obj] for place in finding.where],
+        "where": [
+            [place.doc_path, place.obj, *([place.label, place.standing] if place.standing else [])]
+            for place in finding.where
+        ],
         "file": finding.file,
         "did_you_mean": finding.did_you_mean,
     }
@@ -118,7 +121,7 @@ def _finding(data: Mapping[str, Any]) -> Finding:
         FindingCode[data["code"].upper()],
         Severity(data["severity"]),
         read_beside(data),
-        tuple(Place(path, obj) for path, obj in data["where"]),
+        tuple(Place(*place) for place in data["where"]),
         data.get("file", ""),
         data.get("did_you_mean", ""),
     )

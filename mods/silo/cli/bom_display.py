@@ -17,7 +17,7 @@ from silo.bom.compare.bom_diff import BomDiff
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import counted
 from silo.bom.findings import Finding, Severity
-from silo.bom.items.naming import display_name
+from silo.bom.items.naming import display_name, own_part_name
 from silo.bom.view.diff_rows import diff_rows
 from silo.bom.view.folders import base_folder, shorten
 from silo.bom.view.tree_json import MOST_LINES, check_tree_size
@@ -48,13 +48,13 @@ _DIFFERENCE = {
 _MOST_LINES = 2000
 
 
-def entry_text(entry: BomEntry, base: str) -> Text:
-    """Write one line of the tree."""
+def entry_text(entry: BomEntry, base: str, *, own: bool = False) -> Text:
+    """Write one line of the tree; ``own``: a part modelled in the assembly's file."""
     text = Text().append(f"{entry.quantity} × ", "bold")
     if entry.part_number:
         text.append(plain(entry.part_number), "cyan").append("  ").append(plain(entry.name or ""))
     else:
-        text.append(plain(display_name(entry) or entry.object_name))
+        text.append(plain((own_part_name(entry) if own else display_name(entry)) or entry.object_name))
     where = relative(entry.doc_path, base)
     text.append(f"  {plain(where)}#{plain(entry.object_name)}", "dim")
     if entry.missing:
@@ -87,7 +87,7 @@ def bom_tree(extraction: Extraction, base: str = "") -> Tree:
 
     def grow_own(branch: Tree, entries: Iterable[BomEntry]) -> None:
         for entry in entries:
-            branch.add(entry_text(entry, base).append(spoken("  not an item yet"), "yellow"))
+            branch.add(entry_text(entry, base, own=True).append(spoken("  not an item yet"), "yellow"))
 
     grow(tree, extraction.entries)
     grow_own(tree, head.own)

@@ -62,7 +62,12 @@ def _described(kind: Any, words: str) -> Any:
     return Annotated[kind, Field(description=words)]
 
 
-Place = _shape("Place", file=str, object=str)
+Place = _shape(
+    "Place",
+    file=str,
+    object=str,
+    standing=(_described(str, "of a hidden object: counts, not counted or reference"), ""),
+)
 # What a message is made of, beside its English sentence.
 _MADE_OF: dict[str, Any] = {
     "template": (_described(str, "the message with {name} for each value: its code"), ""),
@@ -264,6 +269,7 @@ Registered = _shape(
     modelled=_many(Modelled),
 )
 Undeclared = _shape("Undeclared", undeclared=list[str])
+Answered = _shape("Answered", counted=list[str], references=list[str])
 Orphan = _shape(
     "Orphan", part_number=str, name=str, component=_described(str, "file#object that it was made for")
 )
@@ -422,7 +428,7 @@ SHAPES: dict[str, Any] = {
     "where-used": WhereUsed,
     "relink": Relinked,
     "sync": Sync,
-    "register": Registered | Undeclared | Orphans | Archived,
+    "register": Registered | Undeclared | Answered | Orphans | Archived,
     "commit": Committed,
     "status": ProjectStatus,
     "pull": Pulled,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Write a Silo identity into an FCStd file, and nothing else.
+"""Write a Silo identity, or the answer if an object counts, into an FCStd file, and nothing else.
 
 The identity goes into the document's ``Meta`` map, which every FreeCAD keeps, also in partial loads (FreeCAD
 0.20 has no document properties of its own).
@@ -19,6 +19,7 @@ from silo.bom.errors import DocumentError
 from silo.bom.message import message
 from silo.bom.walk.document import own
 from silo.bom.walk.identity import META_KEY, meta_key, own_identity
+from silo.bom.walk.kinds import has_own
 from silo.fcstd import expat_reader
 from silo.fcstd.container import ContainerFile, FileStat, ZipEntry
 from silo.fcstd.edit import changed, check_writable, edited_xml, in_attribute, replace_file
@@ -116,7 +117,7 @@ def unstamp(
 
         def edit(text: bytes) -> bytes:
             changes: dict[str, bytes | None] = dict.fromkeys(("SiloItemId", "SiloUUID"))
-            changes["SiloBomExclude"] = _NO_PART if no_part else None
+            changes["SiloBomExclude"] = _ANSWER % b"true" if no_part else None
             return _edited(text, {meta_key(object_name): None}, object_name, changes, limits.depth)
 
         content = replaced_entry(container, *edited_xml(container, edit, limits))
@@ -130,6 +131,41 @@ def unstamp(
                 raise DocumentError(
                     real, message("the copy does not have the mark as wanted; the file is unchanged")
                 )
+
+    replace_file(real, state, content, check)
+    return True
+
+
+def answer(path: Path | str, object_name: str, *, counts: bool, limits: Limits | None = None) -> bool:
+    """Keep in the file if an object counts, whatever the view shows (``SiloBomExclude``); returns False if
+    the file says so already. Raises DocumentError as :func:`stamp` does.
+    """
+    real = one_path(str(path))
+    limits = limits or Limits()
+
+    def answered(file: str) -> bool:
+        with Library(limits=limits) as library:
+            obj = library.open(file).getObject(object_name)
+            if obj is None:
+                raise DocumentError(real, f"it holds no object named {object_name!r}")
+            return own(obj, "SiloBomExclude") is (not counts) and has_own(obj, "SiloBomExclude")
+
+    with ContainerFile(real, limits) as container:
+        state = container.state
+        if answered(real):
+            return False
+        check_writable(real)
+        changes = {"SiloBomExclude": _ANSWER % (b"false" if counts else b"true")}
+        content = replaced_entry(
+            container,
+            *edited_xml(
+                container, lambda text: _edited(text, {}, object_name, changes, limits.depth), limits
+            ),
+        )
+
+    def check(copy: str) -> None:
+        if not answered(copy):
+            raise DocumentError(real, "the copy does not have the answer; the file is unchanged")
 
     replace_file(real, state, content, check)
     return True
@@ -228,9 +264,9 @@ _ITEM_ID = (
     b'<Property name="SiloItemId" type="App::PropertyString" group="Silo" doc="Identity of the item in Silo"'
     b' attr="8" ro="1" hide="0">\n                    <String value="%s"/>\n                </Property>'
 )
-_NO_PART = (
+_ANSWER = (
     b'<Property name="SiloBomExclude" type="App::PropertyBool" group="Silo" doc="True: no part of any BOM"'
-    b' attr="0" ro="0" hide="0">\n                    <Bool value="true"/>\n                </Property>'
+    b' attr="0" ro="0" hide="0">\n                    <Bool value="%s"/>\n                </Property>'
 )
 _META = b'<Property name="Meta" type="App::PropertyMap">'
 _COUNT = re.compile(rb"""(<Properties\b[^<>]*?\sCount\s*=\s*["'])(\d+)(["'])""")

@@ -208,4 +208,4 @@ def _may_replace(path: Path) -> bool:
     return ours or not head
 
 
-FORMAT = 5
+FORMAT = 6

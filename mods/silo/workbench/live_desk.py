@@ -23,6 +23,7 @@ from silo.workbench.freecad.components import (
     write_identity,
 )
 from silo.workbench.freecad.damage import damage
+from silo.workbench.freecad.identities import write_answer
 from silo.workbench.freecad.lost import lost_objects
 from silo.workbench.freecad.modified import is_edited, is_modified
 from silo.workbench.freecad.opening import open_fully
@@ -99,6 +100,7 @@ class LiveDesk:
     unedited = staticmethod(unedited)
     save_marked = staticmethod(saving.save_marked)
     relink = staticmethod(relink)
+    write_answer = staticmethod(write_answer)
 
     def accounts(self, extraction: Extraction) -> list[SolidCount]:
         """Compare the solids that FreeCAD shows with those that the BOM explains."""

@@ -251,3 +251,22 @@ def _flat(table: Iterable[PreviewRow]) -> Iterator[PreviewRow]:
     for row in table:
         yield row
         yield from _flat(row.children)
+
+
+def test_an_answer_about_what_is_hidden_is_kept_and_compared_again(
+    office: Office, flow: PreviewFlow, top: Document
+) -> None:
+    window = opened(office, flow, top)
+    window.flow.decide(top.FileName, top.FileName, ("Body", "Lid"), counts=True)
+    office.settle()
+    window.flow.decide(top.FileName, top.FileName, ("Ref",), counts=False)
+    office.settle()
+    assert office.desk.answers == [(("Body", "Lid"), True), (("Ref",), False)]
+    assert len(window.filled) == 3
+    assert [text.partition(":")[0] for text, _ in window.seen] == [
+        "Counted from now on",
+        "References from now on, not counted",
+    ]
+    office.desk.refusal = DocumentError("/new", "holds no object")
+    window.flow.decide(top.FileName, top.FileName, ("Ref",), counts=True)
+    assert "holds no object" in office.desk.warned[-1]

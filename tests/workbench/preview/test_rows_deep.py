@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import pytest
 
 from silo.bom.entry import BomEntry, Extraction
+from silo.bom.findings import Finding, FindingCode, Place, Severity, Standing
 from silo.testing import FakeSilo
 from silo.workbench.documents.snapshot import Snapshot
 from silo.workbench.preview.comparison import ask
@@ -56,3 +58,37 @@ def test_each_sub_assembly_gets_its_share(silo: FakeSilo) -> None:
     assert [row.kind for row in many.children] == [RowKind.GROUP]
     assert [row.name for row in few.children] == ["Leaf"]
     assert len(table_of(silo, wide, most=4)) == 40
+
+
+def test_what_is_hidden_is_a_sentence_with_a_row_for_each_object(silo: FakeSilo) -> None:
+    """Each can be answered, and the sentence stands for the bodies that do not count."""
+    top = component(silo, "Top", component(silo, "Plate"))
+    where = tuple(
+        Place("/v/Top.FCStd", name, f"my {name}", standing.value)
+        for name, standing in (
+            ("L", Standing.COUNTS),
+            ("B", Standing.NOT_COUNTED),
+            ("R", Standing.REFERENCE),
+        )
+    )
+    finding = Finding(FindingCode.HIDDEN, Severity.WARNING, "Hidden in Top: …", where)
+    own = BomEntry("/v/Top.FCStd", object_name="Body001", label="Body001", document_label="Top", quantity=2)
+    snapshot = Snapshot(
+        top.doc_path,
+        top.label,
+        top.silo_uuid,
+        Extraction(replace(top, own=(own,)), top.children, (finding,)),
+    )
+    table = rows(ask(snapshot, silo, Control(lambda _detail, _fraction: None)))
+    (sentence,) = [row for row in flat(table) if row.kind is RowKind.HIDDEN_PIECES]
+    assert (sentence.objects, sentence.document) == (("B",), "/v/Top.FCStd")
+    assert [(row.kind, row.name, row.objects) for row in sentence.children] == [
+        (RowKind.HIDDEN, f"my {name}", (name,)) for name in "LBR"
+    ]
+    assert [row.note for row in sentence.children] == [
+        "hidden, counts",
+        "hidden, does not count",
+        "hidden, only a reference: does not count",
+    ]
+    (mine,) = [row for row in flat(table) if row.kind is RowKind.OWN]
+    assert (mine.name, mine.cad, mine.document) == ("Top: Body001", "2", "/v/Top.FCStd")

@@ -40,6 +40,15 @@ def proposed_name(entry: BomEntry, *, shares_file: bool = False) -> str:
     return of_document or of_object or message("Unnamed component")
 
 
+def own_part_name(entry: BomEntry) -> str:
+    """Return the name of a part modelled in an assembly's own file: its label, with the file's name where
+    FreeCAD gave the label, so that the lines of six bodies differ.
+    """
+    label = clean_name(entry.label) or entry.object_name
+    named = display_name(entry)
+    return named if not is_generic(label) or entry.standard or named == label else f"{named}: {label}"
+
+
 def display_name(entry: BomEntry) -> str:
     """Return the name of a component for people: its own label, or its document's if that says nothing.
 

@@ -42,6 +42,7 @@ def finding_json(finding: Finding, base: str) -> dict[str, Any]:
     folder.
 
     A broken link also has the ``file`` that it records, and the one that was probably meant, if there is one.
+    A hidden object has a ``standing``: counts, not counted or reference.
     """
     files = {"file": finding.file, "did_you_mean": finding.did_you_mean}
     message = shorten(finding.message, base)
@@ -50,7 +51,14 @@ def finding_json(finding: Finding, base: str) -> dict[str, Any]:
         "severity": finding.severity.value,
         "message": message,
         **beside(message),
-        "where": [{"file": relative(place.doc_path, base), "object": place.obj} for place in finding.where],
+        "where": [
+            {
+                "file": relative(place.doc_path, base),
+                "object": place.obj,
+                **({"standing": place.standing} if place.standing else {}),
+            }
+            for place in finding.where
+        ],
         **{key: relative(path, base) for key, path in files.items() if path},
     }
 

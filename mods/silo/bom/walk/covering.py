@@ -46,7 +46,7 @@ class Covering:
         """Return True if an array or a compound shows an object in the object's own place.
 
         shows
-            says of a hidden array or compound if it shows the object all the same.
+            says of a hidden array or compound if it shows the object anyway.
         """
         if not (by := self._by.get(name)):
             return False

@@ -141,6 +141,8 @@ def extract(
     if entries or mine or walker.notes.any_blocking():
         if getattr(top, "is_document_root", False):  # the links lie in the document itself
             walker.notes.add(FindingCode.NO_CONTAINER, top, "")
+    elif shown := walker.shown_by_part(top) if target.obj is not None else []:
+        walker.notes.one_part(top, head, shown)
     else:
         walker.notes.empty(head)
     if target.obj is not None:
@@ -390,6 +392,11 @@ class _Walker:
         contents = self.reader.contents(top)
         if not contents.is_assembly(top):
             self.notes.hidden(top, contents.hidden_counted, contents.hidden, contents.references)
+
+    def shown_by_part(self, top: Any) -> list[Any]:
+        """Return what a part shows; [] for an assembly."""
+        contents = self.reader.contents(top)
+        return [] if contents.is_assembly(top) else [count.shown.obj for count in contents.own]
 
     def look_for_unexplained(self, top: Any, lines: Sequence[BomEntry]) -> None:
         """Look at each assembly of the walk without believing its roles."""

@@ -7,15 +7,15 @@ A finding reads the same whatever the order in which its objects were met: place
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from silo.bom.entry import BomEntry
 from silo.bom.errors import DocumentError, listed
-from silo.bom.findings import Finding, FindingCode, Place, Severity
+from silo.bom.findings import Finding, FindingCode, Place, Severity, Standing
+from silo.bom.items.naming import display_name
 from silo.bom.message import Message, counted_message, joined, message, template
 from silo.bom.walk.document import DocumentRoot, LinkProblem, label_of, object_name, saved_by
-from silo.bom.walk.seen import is_said_to_count
 
 _Slot = tuple[FindingCode, str]
 
@@ -229,10 +229,15 @@ class Notes:
     ) -> None:
         """Say in one sentence which hidden objects of an assembly count, and which do not."""
         groups = (
-            (counted, counted_message(len(counted), "{n} piece counts", "{n} pieces count")),
-            (not_counted, counted_message(len(not_counted), "{n} body does not", "{n} bodies do not")),
+            (counted, Standing.COUNTS, counted_message(len(counted), "{n} piece counts", "{n} pieces count")),
+            (
+                not_counted,
+                Standing.NOT_COUNTED,
+                counted_message(len(not_counted), "{n} body does not", "{n} bodies do not"),
+            ),
             (
                 references,
+                Standing.REFERENCE,
                 counted_message(
                     len(references),
                     "{n} link is only a reference and does not",
@@ -242,15 +247,25 @@ class Notes:
         )
         parts = [
             message("{words}: {names}", words=words, names=", ".join(map(label_of, objects)))
-            for objects, words in groups
+            for objects, _, words in groups
             if objects
         ]
         if not parts:
             return
-        severity = Severity.WARNING if any(not is_said_to_count(obj) for obj in not_counted) else None
+        severity = Severity.WARNING if not_counted else None
         note = self.add(FindingCode.HIDDEN, container, what=joined("; ", parts), severity=severity)
         note.users.clear()
-        for obj in (*counted, *not_counted, *references):
+        for objects, standing, _ in groups:
+            for obj in objects:
+                place = replace(self.place(obj), label=label_of(obj), standing=standing.value)
+                note.users.setdefault(place, label_of(obj))
+
+    def one_part(self, top: Any, head: BomEntry, shown: Sequence[Any]) -> None:
+        """Say of a file without an assembly that it is one part, and of what."""
+        names = listed(sorted({label_of(obj) for obj in shown}), 8)
+        note = self.add(FindingCode.ONE_PART, top, file=display_name(head), names=names)
+        note.users.clear()
+        for obj in shown:
             note.users.setdefault(self.place(obj), label_of(obj))
 
     def empty(self, head: BomEntry) -> None:

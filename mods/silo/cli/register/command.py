@@ -22,7 +22,7 @@ from silo.cli.connection import client_of
 from silo.cli.options import add_options, add_top, not_with, only_with
 from silo.cli.outputs import declare_output
 from silo.cli.reading import plan_of, read_tops
-from silo.cli.register.declaring import declare, undeclare
+from silo.cli.register.declaring import decide_hidden, declare, undeclare
 from silo.cli.register.orphans import orphans
 from silo.cli.register.run import RegisterProgress, RegisterRun, warn_of_rules
 from silo.output_files import NEW
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 def add_register(parser: argparse.ArgumentParser) -> None:
     """Add the command."""
-    add_top(parser, "--plan", "--apply", "--declare", "--undeclare", "--not-a-part")
+    add_top(parser, "--plan", "--apply", "--declare", "--undeclare", "--not-a-part", "--count", "--reference")
     how = parser.add_mutually_exclusive_group()
     add_options(
         how,
@@ -91,6 +91,8 @@ def add_register(parser: argparse.ArgumentParser) -> None:
             "--not-a-part OBJECT...": (
                 "say of what is modelled in the assembly's own file that it is no part; the file keeps that"
             ),
+            "--count OBJECT...": "count a hidden object (name or label); the file keeps that",
+            "--reference OBJECT...": "say of a hidden object that it counts nowhere; the file keeps that",
         },
     )
     parser.add_argument("--category", help="this category for every part (assemblies keep theirs)")
@@ -99,6 +101,8 @@ def add_register(parser: argparse.ArgumentParser) -> None:
     not_with(parser, "--undeclare", "--declare", "--category", "--not-a-part")
     not_with(parser, "--not-a-part", "--declare", "--category")
     not_with(parser, "--apply", "--category")
+    for option in ("--count", "--reference"):
+        not_with(parser, option, "--declare", "--undeclare", "--not-a-part", "--category")
 
 
 def run_register(args: argparse.Namespace) -> int:
@@ -106,15 +110,21 @@ def run_register(args: argparse.Namespace) -> int:
     taken = args.undeclare or args.not_a_part
     if args.orphans:
         return orphans(args)
-    if not (args.yes or args.adopt or args.plan or args.apply or taken or sys.stdin.isatty()):
+    decided = args.count or args.reference
+    if not (args.yes or args.adopt or args.plan or args.apply or taken or decided or sys.stdin.isatty()):
         raise InputError(
             "register asks before it creates items, and there is nobody to ask here; say --yes, "
             "or write a table with --plan FILE, edit it, and use it with --apply FILE"
         )
     if args.plan and args.json:
         raise InputError("--plan writes a table and no JSON; leave out --json")
-    if (args.declare or taken) and (args.plan or args.apply or os.path.isdir(args.top)):
-        raise InputError("--declare, --undeclare and --not-a-part are for one file, and not for a table")
+    if (args.declare or taken or decided) and (args.plan or args.apply or os.path.isdir(args.top)):
+        raise InputError(
+            "--declare, --undeclare, --not-a-part, --count and --reference are for one file, and not for a"
+            " table"
+        )
+    if decided:
+        return decide_hidden(args)
     if taken:
         return undeclare(args)
     if args.declare:

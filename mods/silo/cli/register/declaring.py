@@ -1,21 +1,27 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""``silo-mod register --declare``, ``--undeclare``, ``--not-a-part``: parts modelled in an assembly file."""
+"""``silo-mod register --declare``, ``--undeclare``, ``--not-a-part``: parts modelled in an assembly file; and
+``--count``, ``--reference``: if a hidden object counts.
+"""
 
 from __future__ import annotations
 
 import argparse
 import os
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from silo import spoken
 from silo.bom.errors import DocumentError, Exit, InputError
+from silo.bom.findings import Place
 from silo.bom.items.proposal import propose
+from silo.bom.message import message
 from silo.cli.connection import client_of
 from silo.cli.json_output import print_json
 from silo.cli.register.run import RegisterRun, warn_of_rules
 from silo.freecads.open_documents import open_in_any
 from silo.registering.candidate import Candidate, ComponentState
 from silo.registering.closed_files import OPEN
+from silo.registering.hidden import hidden_in
 from silo.registering.modelled import chosen, modelled
 from silo.registering.offer import Offer
 from silo.registering.request import RegistrationRequest
@@ -71,3 +77,52 @@ def undeclare(args: argparse.Namespace) -> int:
         text = f"Undecided again: {', '.join(taken)}. The next sync flags a line of it as unreferenced."
         print(spoken(text))
     return Exit.DONE
+
+
+def decide_hidden(args: argparse.Namespace) -> int:
+    """Keep in the file which hidden objects count, and which are only references."""
+    from silo.fcstd import answer
+
+    asked = hidden_in(args.top, args.assembly)
+    wanted = {True: _chosen(asked, args.count), False: _chosen(asked, args.reference)}
+    if both := {place.obj for place in wanted[True]} & {place.obj for place in wanted[False]}:
+        raise InputError(f"{', '.join(sorted(both))}: give --count or --reference, not both")
+    path = os.path.realpath(args.top)
+    if not args.even_if_open and open_in_any().has_file(path):
+        raise DocumentError(path, OPEN)
+    changed = {
+        counts: [place for place in places if answer(path, place.obj, counts=counts)]
+        for counts, places in wanted.items()
+    }
+    if args.json:
+        print_json(
+            {
+                "counted": [place.obj for place in changed[True]],
+                "references": [place.obj for place in changed[False]],
+            }
+        )
+        return Exit.DONE
+    for counts, places in changed.items():
+        names = ", ".join(place.label or place.obj for place in places)
+        if places and counts:
+            print(spoken(message("Counts, whatever the view shows: {names}.", names=names)))
+        elif places:
+            print(spoken(message("Reference, counts nowhere: {names}.", names=names)))
+    if not any(changed.values()):
+        print(spoken("Nothing to do: the file says so already."))
+    return Exit.DONE
+
+
+def _chosen(places: Sequence[Place], names: Iterable[str]) -> list[Place]:
+    """Return the hidden objects with these names or labels. InputError for a name that none has."""
+    found: dict[str, Place] = {}
+    for name in names:
+        fitting = [place for place in places if place.obj == name] or [
+            place for place in places if place.label == name
+        ]
+        if len(fitting) != 1:
+            listed = ", ".join(place.obj for place in places) or "nothing"
+            what = "nothing" if not fitting else f"{len(fitting)} objects"
+            raise InputError(f"{name!r} means {what} that is hidden in this assembly; there is: {listed}")
+        found[fitting[0].obj] = fitting[0]
+    return list(found.values())

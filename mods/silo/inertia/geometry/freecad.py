@@ -32,7 +32,7 @@ from silo.bom.key import Key
 from silo.bom.walk.arrays import draft_elements, elements, left_out_by
 from silo.bom.walk.contents import Contents, Contribution, Count, Lost
 from silo.bom.walk.document import LinkProblem, derived, first_of, label_of, object_name, own, relative
-from silo.bom.walk.kinds import REPEATERS, Kind, is_container, is_named_assembly, kind_of
+from silo.bom.walk.kinds import REPEATERS, Kind, is_container, kind_of
 from silo.bom.walk.roots import choose_assembly, seen_beside, silent_reader
 from silo.bom.walk.standard import STANDARD_PARTS
 from silo.bom.walk.targets import Step, is_assembly_link, is_link
@@ -275,7 +275,8 @@ class Walk:
         materials = {self.facts.material(end) for end, _ in bodies}
         mine = self.facts.material(obj)
         one_piece = not contents.counts and len(bodies) == len(shapes)
-        if bodies and one_piece and (mine != NOTHING or len(materials) <= 1) and not is_named_assembly(obj):
+        is_part = one_piece and not contents.is_assembly(obj)
+        if bodies and is_part and (mine != NOTHING or len(materials) <= 1):
             self._leaf(key, obj, bodies)
             return
         children: list[Child] = []
@@ -441,9 +442,15 @@ class Walk:
 
     def _is_one_shape(self, obj: Any) -> bool:
         """Return True for an array without links, which older FreeCADs save as one shape."""
-        if kind_of(obj) is not Kind.DRAFT_ARRAY or self.facts.places(obj):
+        if kind_of(obj) is not Kind.DRAFT_ARRAY or self._array_places(obj):
             return False
         return self.facts.shape(obj) is not None
+
+    def _array_places(self, array: Any) -> list[Floats]:
+        """Return (4, 4) for each instance of a Draft array; an expanded array keeps them in its elements."""
+        return self.facts.places(array) or [
+            self._link_placement(element) @ scale(element) for element in draft_elements(array)
+        ]
 
     def _draft_array(
         self, node: Contribution, key: Key, outer: Floats, below: list[Contribution]
@@ -453,7 +460,7 @@ class Walk:
             if key == next(iter(node.brings)):  # it holds all that the array shows
                 yield obj, obj, outer
             return
-        places = self.facts.places(obj)
+        places = self._array_places(obj)
         for inner in below:
             seen = list(self._placed(inner, key, own(obj, "LinkTransform") is True))
             if not places:

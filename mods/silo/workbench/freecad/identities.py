@@ -6,6 +6,7 @@ FreeCAD's main thread only; the caller saves.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 from silo.workbench.freecad.modified import others_unmarked
@@ -59,6 +60,20 @@ def remove_identity(doc: Any, name: str, *, no_part: bool = False, whole_documen
         doc.Meta = {key: value for key, value in doc.Meta.items() if key not in gone}
         if whole_document and "SiloUUID" in getattr(doc, "PropertiesList", ()):
             _set(doc, "SiloUUID", "")
+
+
+def write_answer(doc: Any, names: Iterable[str], *, counts: bool) -> list[str]:
+    """Keep in the objects if they count, whatever the view shows, in one step of undo; returns their labels.
+    The caller saves.
+    """
+    objects = [obj for obj in map(doc.getObject, names) if obj is not None]
+    doc.openTransaction("Silo: count" if counts else "Silo: reference")
+    with others_unmarked(doc):
+        for obj in objects:
+            tip = "True: no part of any BOM"
+            _set(obj, "SiloBomExclude", not counts, "App::PropertyBool", tip, locked=False)
+    doc.commitTransaction()
+    return [str(obj.Label) for obj in objects]
 
 
 # FreeCAD's number for "a change of it asks for no recompute" (Prop_Output of App::PropertyType).

@@ -203,7 +203,7 @@ class _Witness:
             account.beside += seen.shown if name in beside else 0
             account.explained += predicted[name]
             self._judge(account, seen, predicted[name], obj.Document, may_hide=name not in beside)
-        if own or not contents.own:  # a part is not an assembly of its bodies
+        if contents.is_assembly(obj):  # a part is not an assembly of its bodies
             self._compare_lines(account, lines, pieces)
         return account
 

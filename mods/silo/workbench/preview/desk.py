@@ -44,5 +44,8 @@ class PreviewDesk(Desk, Protocol):
         it.
         """
 
+    def write_answer(self, doc: Any, names: Collection[str], /, *, counts: bool) -> list[str]:
+        """Keep in the objects of a document if they count; returns their labels."""
+
     def relink(self, finding: Finding, /) -> list[str]:
         """Set the live links of a finding to the file that was meant; returns their labels."""

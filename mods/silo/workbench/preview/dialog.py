@@ -30,6 +30,7 @@ _TONES = {
     RowKind.UNREGISTERED: Tone.WARNING,
     RowKind.MISSING: Tone.ERROR,
     RowKind.NOT_COUNTED: Tone.PLAIN,
+    RowKind.OWN: Tone.WARNING,
 }
 _SIGNS = {
     RowKind.ADDED: "+",
@@ -38,6 +39,7 @@ _SIGNS = {
     RowKind.UNREFERENCED: "⚠",
     RowKind.MANUAL: "✎",
     RowKind.UNREGISTERED: "?",
+    RowKind.OWN: "?",
     RowKind.MISSING: "✗",
     RowKind.UNCHANGED: "=",
 }
@@ -54,7 +56,9 @@ class Column(NamedTuple):
 
 
 # Sentences rather than lines of a BOM.
-_WIDE = (RowKind.GROUP, RowKind.NOT_COUNTED)
+_WIDE = (RowKind.GROUP, RowKind.NOT_COUNTED, RowKind.HIDDEN_PIECES)
+# About what these rows name, the user may say if it counts.
+_ANSWERABLE = (RowKind.HIDDEN, RowKind.HIDDEN_PIECES)
 
 
 class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
@@ -136,6 +140,18 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
             self._why,
             translate("Silo", "Show each chain of links and arrays from the assembly to the part"),
         )
+        self.count_button = button(
+            translate("Silo", "Count It"),
+            "count",
+            lambda: self._decide(counts=True),
+            translate("Silo", "Count the hidden objects of the selected row; the file keeps that"),
+        )
+        self.reference_button = button(
+            translate("Silo", "Reference"),
+            "reference",
+            lambda: self._decide(counts=False),
+            translate("Silo", "The hidden objects of the selected row count nowhere; the file keeps that"),
+        )
         self.refresh_button = button(
             translate("Silo", "Compare again"), "refresh", lambda: self._flow.again(self._path)
         )
@@ -159,8 +175,10 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         self.sync_button = button(translate("Silo", "Sync"), "sync", self._sync, default=True)
         close = button(translate("Silo", "Close"), "close", self.close)
         left = (self.show_button, self.why_button, self.refresh_button, self.verify_button, self.view_button)
+        self.table.itemSelectionChanged.connect(self._enable_answers)
+        answers = (self.count_button, self.reference_button)
         right = (self.relink_button, self.register_button, self.sync_button, close)
-        return widgets.line(*left, None, *right)
+        return widgets.line(*left[:2], *answers, *left[2:], None, *right)
 
     # -- what is shown ----------------------------------------------------------------------------------
 
@@ -305,6 +323,7 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         self.verify_button.setEnabled(preview is not None)
         movable = preview.movable if preview is not None else ()
         self.relink_button.setVisible(bool(movable))
+        self._enable_answers()
         self.relink_button.setToolTip(
             tip("\n".join(f"{finding.file} → {finding.did_you_mean}" for finding in movable))
         )
@@ -325,6 +344,18 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         document, _, assembly, parts = self._counted()
         if parts:
             self._flow.why(self._path, document, assembly, [(path, name) for path, name in parts])
+
+    def _enable_answers(self) -> None:
+        """Offer the answers about hidden objects while one of them is selected."""
+        item = self.table.currentItem()
+        is_hidden = item is not None and item.data(1, _DATA) in _ANSWERABLE and bool(self._counted()[1])
+        for button in (self.count_button, self.reference_button):
+            button.setVisible(is_hidden)
+
+    def _decide(self, *, counts: bool) -> None:
+        document, objects, *_ = self._counted()
+        if objects:
+            self._flow.decide(self._path, document, tuple(objects), counts=counts)
 
     def _sync(self) -> None:
         if self._preview is not None:

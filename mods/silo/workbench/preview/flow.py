@@ -180,6 +180,26 @@ class PreviewFlow:
         text = "\n".join(plain(line, MOST_CELL) for line in lines)
         self._with_dialog(window, lambda dialog: dialog.tell_view(text, agrees=None))
 
+    def decide(self, window: str, document: str, names: tuple[str, ...], *, counts: bool) -> None:
+        """Keep in a document which hidden objects count, or are references; then compare again."""
+        if (doc := self._opened(document, window)) is None:
+            return
+        try:
+            labels = self._desk.write_answer(doc, names, counts=counts)
+        except SiloError as error:
+            self._desk.warn(translate("Silo", "BOM in Silo"), str(error))
+            return
+        text = (
+            translate("Silo", "Counted from now on: {names}. Save the file to keep that.")
+            if counts
+            else translate(
+                "Silo", "References from now on, not counted: {names}. Save the file to keep that."
+            )
+        )
+        told = text.replace("{names}", plain(", ".join(labels), MOST_CELL))
+        self._with_dialog(window, lambda dialog: dialog.tell_view(told, agrees=None))
+        self.again(window)
+
     def relink(self, preview: Preview) -> None:
         """Lead broken links to the files that were meant, if exactly one fits; then compare again."""
         try:

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from silo.bom.compare.bom_diff import BomDiff
 from silo.bom.entry import BomEntry
-from silo.bom.findings import Finding, FindingCode, Severity
-from silo.bom.items.naming import display_name
+from silo.bom.findings import Finding, FindingCode, Severity, Standing
+from silo.bom.items.naming import display_name, own_part_name
 from silo.bom.view.folders import shorten
 from silo.bom.walk.document import relative
 from silo.workbench.preview.comparison import Compared, Preview
@@ -38,6 +38,9 @@ class RowKind(StrEnum):
     UNREGISTERED = "unregistered"
     MISSING = "missing"
     NOT_COUNTED = "not counted"
+    HIDDEN = "hidden"
+    HIDDEN_PIECES = "hidden pieces"
+    OWN = "own"
     GROUP = "group"
 
 
@@ -93,6 +96,10 @@ def rows(preview: Preview, most: int = MOST_ROWS) -> tuple[PreviewRow, ...]:
     if unregistered:
         title = translate("Silo", "Without a part number: left out until registered")
         table.append(_group(title, unregistered))
+    head = preview.top.resolved.assembly
+    own = tuple(_own_row(line, head) for line in head.own[:most])
+    if own:
+        table.append(_group(translate("Silo", "Modelled in this file: no items yet, never sent"), own))
     left_out = tuple(
         _finding_row(f, preview, base)
         for f in sorted(
@@ -229,6 +236,12 @@ def _unregistered_row(entry: BomEntry, preview: Preview, children: tuple[Preview
     )
 
 
+def _own_row(line: BomEntry, head: BomEntry) -> PreviewRow:
+    return PreviewRow(
+        RowKind.OWN, name=own_part_name(line), cad=quantity(line.quantity), **_counted(line, head)
+    )
+
+
 def _counted(entry: BomEntry, head: BomEntry) -> dict[str, Any]:
     """Return the fields of a row for an entry of the model, directly below an assembly."""
     return {
@@ -242,18 +255,56 @@ def _counted(entry: BomEntry, head: BomEntry) -> dict[str, Any]:
 # Shown as separate rows.
 _ELSEWHERE = (FindingCode.UNREGISTERED,)
 
+_SEVERITY_SIGNS = {Severity.ERROR: "✗", Severity.WARNING: "⚠", Severity.INFO: "·"}
+
+# Rows of hidden objects below one sentence, which names them all.
+MOST_HIDDEN = 200
+
 _ORDER = {Severity.ERROR: 0, Severity.WARNING: 1, Severity.INFO: 2}
 
 
 def _finding_row(finding: Finding, preview: Preview, base: str) -> PreviewRow:
     top = preview.snapshot.path
+    if finding.code is FindingCode.HIDDEN:
+        return _hidden_row(finding, base)
     mine = tuple(place.obj for place in finding.where if place.doc_path == top and place.obj)
     return PreviewRow(
         RowKind.NOT_COUNTED,
-        number={Severity.ERROR: "✗", Severity.WARNING: "⚠", Severity.INFO: "·"}[finding.severity],
+        number=_SEVERITY_SIGNS[finding.severity],
         note=spoken(shorten(finding.message, base)),
         document=top if mine else "",
         objects=mine,
+    )
+
+
+def _hidden_row(finding: Finding, base: str) -> PreviewRow:
+    """Make a row for what is hidden in an assembly, with a row for each object, to say if it counts.
+
+    The first row stands for the bodies that do not count: the question.
+    """
+    document = finding.where[0].doc_path if finding.where else ""
+    words = {
+        Standing.COUNTS: translate("Silo", "hidden, counts"),
+        Standing.NOT_COUNTED: translate("Silo", "hidden, does not count"),
+        Standing.REFERENCE: translate("Silo", "hidden, only a reference: does not count"),
+    }
+    children = tuple(
+        PreviewRow(
+            RowKind.HIDDEN,
+            name=place.label or place.obj,
+            note=words.get(Standing(place.standing), "") if place.standing else "",
+            document=place.doc_path,
+            objects=(place.obj,),
+        )
+        for place in finding.where[:MOST_HIDDEN]
+    )
+    return PreviewRow(
+        RowKind.HIDDEN_PIECES,
+        number=_SEVERITY_SIGNS[finding.severity],
+        note=spoken(shorten(finding.message, base)),
+        document=document,
+        objects=tuple(place.obj for place in finding.where if place.standing == Standing.NOT_COUNTED),
+        children=children,
     )
 
 

@@ -1068,6 +1068,26 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../preview/dialog.py" />
+            <source>Count It</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>Count the hidden objects of the selected row; the file keeps that</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>Reference</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>The hidden objects of the selected row count nowhere; the file keeps that</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
             <source>Compare again</source>
             <translation type="unfinished" />
         </message>
@@ -1144,12 +1164,27 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../preview/flow.py" />
+            <source>Counted from now on: {names}. Save the file to keep that.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>References from now on, not counted: {names}. Save the file to keep that.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
             <source>Nothing was synced: {name} was edited since the comparison. Here it is now.</source>
             <translation type="unfinished" />
         </message>
         <message>
             <location filename="../../preview/rows.py" />
             <source>Without a part number: left out until registered</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>Modelled in this file: no items yet, never sent</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1205,6 +1240,21 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../preview/rows.py" />
             <source>its own BOM differs from Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>hidden, counts</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>hidden, does not count</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>hidden, only a reference: does not count</source>
             <translation type="unfinished" />
         </message>
         <message>

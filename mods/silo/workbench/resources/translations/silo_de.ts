@@ -1069,6 +1069,26 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../preview/dialog.py" />
+            <source>Count It</source>
+            <translation>Mitzählen</translation>
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>Count the hidden objects of the selected row; the file keeps that</source>
+            <translation>Die ausgeblendeten Objekte der gewählten Zeile mitzählen; die Datei behält das</translation>
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>Reference</source>
+            <translation>Referenz</translation>
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>The hidden objects of the selected row count nowhere; the file keeps that</source>
+            <translation>Die ausgeblendeten Objekte der gewählten Zeile zählen nirgends; die Datei behält das</translation>
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
             <source>Compare again</source>
             <translation>Neu vergleichen</translation>
         </message>
@@ -1145,6 +1165,16 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../preview/flow.py" />
+            <source>Counted from now on: {names}. Save the file to keep that.</source>
+            <translation>Zählt ab jetzt: {names}. Speichern Sie die Datei, damit es so bleibt.</translation>
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>References from now on, not counted: {names}. Save the file to keep that.</source>
+            <translation>Ab jetzt Referenzen, nicht gezählt: {names}. Speichern Sie die Datei, damit es so bleibt.</translation>
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
             <source>Nothing was synced: {name} was edited since the comparison. Here it is now.</source>
             <translation>Nichts wurde abgeglichen: {name} wurde seit dem Vergleich geändert. So ist der Stand jetzt.</translation>
         </message>
@@ -1152,6 +1182,11 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
             <location filename="../../preview/rows.py" />
             <source>Without a part number: left out until registered</source>
             <translation>Ohne Teilenummer: fehlt bis zur Registrierung</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>Modelled in this file: no items yet, never sent</source>
+            <translation>In dieser Datei modelliert: noch keine Artikel, wird nie gesendet</translation>
         </message>
         <message>
             <location filename="../../preview/rows.py" />
@@ -1207,6 +1242,21 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
             <location filename="../../preview/rows.py" />
             <source>its own BOM differs from Silo</source>
             <translation>ihre eigene Stückliste weicht von Silo ab</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>hidden, counts</source>
+            <translation>ausgeblendet, zählt</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>hidden, does not count</source>
+            <translation>ausgeblendet, zählt nicht</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>hidden, only a reference: does not count</source>
+            <translation>ausgeblendet, nur eine Referenz: zählt nicht</translation>
         </message>
         <message>
             <location filename="../../preview/rows.py" />
