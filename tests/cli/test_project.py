@@ -265,3 +265,31 @@ def test_what_somebody_wrote_into_the_memory_of_a_project_is_left_out(tmp_path: 
     assert Project(str(tmp_path)).records() == {"d": FileRecord("D")}
     (tmp_path / PROJECT_FILE).write_text(json.dumps({"files": ["a"]}))
     assert Project(str(tmp_path)).records() == {}
+
+
+def test_a_bom_that_is_held_is_said_and_goes_out_when_its_file_is_back(
+    registered: Path, silo: Any, run: Any, tmp_path: Path
+) -> None:
+    """``commit`` says why as ``sync`` does, and ends with 1; any later commit frees it."""
+    arm, away = registered / "parts" / "Arm.FCStd", tmp_path / "Arm.FCStd"
+    arm.rename(away)
+    ran = run("commit", registered)
+    assert ran.code == 1
+    assert "not synced: links are broken" in ran.out
+    reason = next(line.strip() for line in ran.out.splitlines() if "Arm.FCStd" in line and "missing" in line)
+    assert reason.rpartition("/")[2] in run("sync", registered / "asm" / "Top.FCStd").out
+    (item,) = silo.client.search_items("Robot")
+    assert silo.client.get_item(item.part_number).last_sync.held.left_out[0].file.endswith("Arm.FCStd")
+    told = run("status", registered, "--json")
+    held = {one["path"]: one["held_bom"] for one in told.json()["files"] if one["held_bom"]}
+    assert (told.code, held) == (1, {"asm/Top.FCStd": "1 file missing"})
+    assert "its BOM is held: 1 file missing" in run("status", registered).out
+    away.rename(arm)
+    other = tmp_path / "other"
+    other.mkdir()
+    Doc(label="Sheet").save(other / "Sheet.FCStd")
+    assert run("commit", other).code == 0
+    assert silo.client.get_item(item.part_number).last_sync.held is None
+    assert len(silo.client.get_bom(item.part_number)) == 3
+    assert run("commit", registered).code == 0
+    assert run("status", registered).code == 0

@@ -295,6 +295,7 @@ Standing = _shape(
     items=int,
     moved_from=str | None,
     newest=_described(int | None, "the newest revision in Silo"),
+    held_bom=_described(str | None, "why its BOM could not be sent"),
 )
 _ProjectLink = _shape("ProjectLink", file=str, link=str)
 ProjectStatus = _shape(
@@ -307,7 +308,15 @@ ProjectStatus = _shape(
     gone=list[str],
     copies=_many(_shape("Copy", file=str, of=str)),
 )
-SentFile = _shape("SentFile", path=str, part_number=str, revision=int | None, bom=str | None, remark=str)
+SentFile = _shape(
+    "SentFile",
+    path=str,
+    part_number=str,
+    revision=int | None,
+    bom=str | None,
+    remark=str,
+    blocked_by=_described(list[str], "why its BOM is held"),
+)
 Committed = _shape(
     "Committed",
     base=ProjectStatus,

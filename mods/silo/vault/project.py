@@ -45,6 +45,7 @@ from silo.file_state import ON_TOP, FileState, file_state, remembered_state
 from silo.files import documents_in
 from silo.locator import FoundFile, Locator
 from silo.outbox.entry import SAME_PART, UNKNOWN, Commit, Entry, InFile, State, new_key, on_top
+from silo.outbox.held_here import HeldHere
 from silo.outbox.recorded import arrived
 from silo.outbox.store import Store
 from silo.platform.spelling import one_path
@@ -118,11 +119,23 @@ class Belonging:
 
 @dataclass(frozen=True)
 class FileStanding:
-    """A file and how it stands; ``newest``: its newest revision in Silo, None where there is none."""
+    """A file and how it stands.
+
+    newest
+        its newest revision in Silo, None where there is none.
+    held
+        why its BOM could not be sent although its file was; "" if no BOM is held.
+    """
 
     file: ProjectFile
     state: FileState
     newest: Revision | None = None
+    held: str = ""
+
+    @property
+    def is_fine(self) -> bool:
+        """Return True if Silo has the file as it is here, and its BOM."""
+        return self.state is FileState.SAME and not self.held
 
 
 def find_project(tops: Sequence[str], root: str | None = None) -> Project:
@@ -376,6 +389,7 @@ def compare(belonging: Belonging, client: SiloClient | None, store: Store) -> li
     queued = {
         (entry.identity.lower(), entry.sha256): entry.state for entry in store.entries() if entry.file_left
     }
+    held = {one.identity.lower(): one.why for one in store.held_boms(client.base_url if client else "")}
     standings = []
     for file in belonging.files:
         revision = newest.get(file.document.lower())
@@ -385,7 +399,7 @@ def compare(belonging: Belonging, client: SiloClient | None, store: Store) -> li
         waits = queued.get((file.document.lower(), file.sha256))
         if waits is not None and state is not FileState.SAME:
             state = FileState.HELD if waits is State.HELD else FileState.WAITING
-        standings.append(FileStanding(file, state, revision))
+        standings.append(FileStanding(file, state, revision, held.get(file.item.lower(), "")))
     return standings
 
 
@@ -587,19 +601,57 @@ def send_along(
     standings = compare(belonging, client, store)
     remember(belonging.project, standings, client)
     asked = [standing for standing in standings if standing.file.path not in skip]
-    boms = _open_boms(asked, client, allow_missing=bool(how.get("allow_missing")))
+    boms = _open_boms(asked, client, store, allow_missing=bool(how.get("allow_missing")))
+    freed = 0
+    if client is not None:
+        freed = free_held(client, store, {standing.file.path for standing in standings})
     queued = set()
     for file, commit in commits(belonging, standings, boms=boms, hold=True, **how):
         if file.path not in skip:
             keep(belonging.project, store, file, commit, server)
             queued.add(file.place)
-    return SentAlong(tuple(asked), frozenset(queued), len(boms) + retried)
+    return SentAlong(tuple(asked), frozenset(queued), len(boms) + retried + freed)
+
+
+def free_held(client: SiloClient, store: Store, skip: Container[str] = ()) -> int:
+    """Put the BOMs into the queue that were held and can go now; return how many.
+
+    skip
+        the files whose BOMs the caller sends.
+    """
+    count = 0
+    for held in store.held_boms(client.base_url):
+        if held.path in skip or not os.path.isfile(held.path):
+            continue
+        with suppress(InputError, NotFoundError):  # it stays held
+            count += _free(held, client, store)
+    return count
+
+
+def _free(held: HeldHere, client: SiloClient, store: Store) -> int:
+    whole = read_project([held.path], find_project([held.path]))
+    files = [one for one in whole.files if one.path == one_path(held.path) and one.item]
+    belonging = replace(whole, files=tuple(one for one in files if one.item.lower() == held.identity.lower()))
+    standings = compare(belonging, client, store)
+    boms = _open_boms(standings, client, store)
+    made = list(commits(belonging, standings, boms=boms)) if boms else []
+    for file, commit in made:
+        if commit.file is None:  # an edited file goes with a commit of the user
+            keep(belonging.project, store, file, commit, client.base_url)
+    return len(boms)
 
 
 def _open_boms(
-    standings: Iterable[FileStanding], client: SiloClient | None, *, allow_missing: bool
+    standings: Iterable[FileStanding],
+    client: SiloClient | None,
+    store: Store,
+    *,
+    allow_missing: bool = False,
 ) -> frozenset[str]:
-    """Return the places of the files in Silo whose BOM is not there as it is here, and can go."""
+    """Return the places of the files in Silo whose BOM is not there as it is here, and can go.
+
+    A BOM that was held, and that Silo has by now, is held no more.
+    """
     places = set()
     for standing in standings if client is not None else ():
         bom = standing.file.bom
@@ -611,6 +663,8 @@ def _open_boms(
             decided = decide(resolved, lines, allow_missing=allow_missing, server=server_of(client))
             if decided.status is Status.MERGED:
                 places.add(standing.file.place)
+            elif decided.status is Status.UNCHANGED:
+                store.free_bom(client.base_url, standing.file.item)
     return frozenset(places)
 
 

@@ -10,6 +10,7 @@ from functools import cached_property
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from silo.platform import one_path
 from silo.workbench.freecad import host
 from silo.workbench.gui import qt
 from silo.workbench.pane.dock import ActivityDock
@@ -62,6 +63,8 @@ class AddOn:
         self._present: tuple[Any, tuple[str, ...]] = (None, ())
         self._window: Any = None
         self._refreshing = False
+        self._signs: Any = None
+        self._asked: frozenset[str] = frozenset()
         self._timer: Any = None
         self._watch: Any = None
 
@@ -246,6 +249,27 @@ class AddOn:
         if shown is not None:
             presence = self._presence(shown.newer) if shown.newer else ()
             self.dock.update_shown(replace(shown, presence=presence))
+            self._draw_signs(shown)
+            questions = shown.questions()
+            if questions - self._asked:
+                self.dock.show_and_raise()
+            self._asked = questions
+
+    def _draw_signs(self, shown: PaneState) -> None:
+        """Draw the signs in status bar and tree that something needs an answer."""
+        if self._signs is None:
+            from silo.workbench.gui.status_sign import StatusSign
+            from silo.workbench.gui.tree_sign import TreeSign
+
+            window = host.main_window()
+            self._signs = StatusSign(window, self.dock.show_and_raise), TreeSign(window)
+        status, tree = self._signs
+        status.draw(shown)
+        held = {held.path: held.sentence for held in shown.held}
+        docs = [doc for doc in host.documents() if held and doc.FileName]
+        tree.draw(
+            {str(doc.Label): held[one_path(doc.FileName)] for doc in docs if one_path(doc.FileName) in held}
+        )
 
     def _presence(self, colleagues: Mapping[str, Newer]) -> tuple[str, ...]:
         """Say which open documents colleagues have committed since they were opened."""

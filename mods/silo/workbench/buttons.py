@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -46,10 +47,10 @@ class Buttons:
             Do.DETAILS: self._details,
             Do.STOP: lambda _action: addon.session.cancel(),
             Do.PREVIEW: lambda action: self._with_document(action.document, addon.previews.start),
-            Do.MEND: lambda action: self._with_document(
+            Do.MEND: lambda action: self._with_opened(
                 action.document, lambda doc: addon.previews.start(doc, mend=True)
             ),
-            Do.SYNC_WITHOUT: lambda action: self._with_document(
+            Do.SYNC_WITHOUT: lambda action: self._with_opened(
                 action.document, lambda doc: addon.commits.sync_only(doc, allow_missing=True)
             ),
             Do.SAME: self._same_part,
@@ -130,6 +131,18 @@ class Buttons:
             host.warning(translate("Silo", "[Silo] This document is not open: ") + plain(path))
         else:
             call(doc)
+
+    def _with_opened(self, path: str, call: Callable[[object], object]) -> None:
+        """Do it with this document, which is opened if it is not."""
+        from silo.bom.errors import SiloError
+
+        if host.find_document(path) is None and os.path.isfile(path):
+            try:
+                self._addon.desk.open(path)
+            except SiloError as error:
+                self._addon.session.problem(error)
+                return
+        self._with_document(path, call)
 
     def open_page(self, url: str) -> None:
         """Open a page of the server in use; if no browser opens, put the address on the clipboard."""

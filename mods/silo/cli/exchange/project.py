@@ -16,8 +16,11 @@ from silo.cli.options import add_options
 from silo.cli.progress import set_sending_step, set_step
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from silo.api.client import SiloClient
-    from silo.outbox.report import Report
+    from silo.bom.findings import Finding
+    from silo.outbox.report import Report, Sent
     from silo.vault.project import Belonging, FileStanding
 
 
@@ -61,7 +64,7 @@ def run_status(args: argparse.Namespace) -> int:
         print_json(_status_json(belonging, standings))
     else:
         _show(belonging, standings)
-    fine = all(standing.state.name == "SAME" for standing in standings)
+    fine = all(standing.is_fine for standing in standings)
     whole = not (_unsound(belonging) or belonging.gone or belonging.missing)
     return Exit.DONE if fine and whole else Exit.UNDONE
 
@@ -78,6 +81,7 @@ def run_commit(args: argparse.Namespace) -> int:
         commits,
         compare,
         find_project,
+        free_held,
         keep,
         left_in_queue,
         name_documents,
@@ -102,6 +106,8 @@ def run_commit(args: argparse.Namespace) -> int:
         if not args.json:
             _show(belonging, standings)
         remember(belonging.project, standings, there)
+        if there is not None:
+            free_held(there, store, {file.path for file in belonging.files})
         mine = set()
         options = {"allow_missing": args.allow_missing, "over_newer": over}
         for file, commit in commits(belonging, standings, comment=args.comment or "", **options):
@@ -125,7 +131,7 @@ def run_commit(args: argparse.Namespace) -> int:
         result = {"sent": sent, "waiting": waiting, "models": models, "undrawn": undrawn}
         print_json({**_status_json(belonging, standings), **result})
     else:
-        _show_sent(report, sent, left, behind)
+        _show_sent(report, sent, left, behind, belonging.project.root)
         _show_models(models, undrawn)
     done = not (left or behind or incomplete or _unsound(belonging) or report.stopped_by or report.busy)
     return exit_of(away) if away else Exit.DONE if done else Exit.UNDONE
@@ -167,10 +173,18 @@ def _sent(report: Report, mine: set[str]) -> list[dict[str, Any]]:
             "revision": file.revision if file.entry.has_file else None,
             "bom": file.status.value if file.status is not None else None,
             "remark": file.entry.remark or draft_text(file.result or file.uploaded),
+            "blocked_by": [one.message for one in _blocking(file)],
         }
         for file in report.sent
         if file.entry.key in mine
     ]
+
+
+def _blocking(sent: Sent) -> Sequence[Finding]:
+    """Return what holds the BOM of a commit that arrived, as ``sync`` names it."""
+    from silo.bom_sync.resolved import blocking
+
+    return blocking(sent.resolved) if sent.status == "blocked" and sent.resolved is not None else ()
 
 
 def _status_json(belonging: Belonging, standings: list[FileStanding]) -> dict[str, Any]:
@@ -184,6 +198,7 @@ def _status_json(belonging: Belonging, standings: list[FileStanding]) -> dict[st
                 "items": len({item for item, _ in standing.file.held}),
                 "moved_from": standing.file.moved_from or None,
                 "newest": standing.newest.revision_number if standing.newest is not None else None,
+                "held_bom": standing.held or None,
             }
             for standing in standings
         ],
@@ -242,6 +257,9 @@ def _show(belonging: Belonging, standings: list[FileStanding]) -> None:
         if standing.file.moved_from:
             line.append(plain(spoken(f"  was {standing.file.moved_from}")), "cyan")
         out.print(line)
+        if standing.held:
+            held = spoken(f"its BOM is held: {standing.held}")
+            out.print(Text(plain(f"  ✗ {held}"), "red"))
         if standing.file.problem:
             out.print(Text(plain(spoken(f"  {standing.file.problem}")), "yellow"))
     notes = [
@@ -262,10 +280,13 @@ def _show(belonging: Belonging, standings: list[FileStanding]) -> None:
 
 
 def _show_sent(
-    report: Report, sent: list[dict[str, Any]], left: list[Any], behind: list[FileStanding]
+    report: Report, sent: list[dict[str, Any]], left: list[Any], behind: list[FileStanding], base: str
 ) -> None:
     from rich.text import Text
 
+    from silo.batch import STATUS_WORDS
+    from silo.bom.view.folders import shorten
+    from silo.bom_sync.steps import Status
     from silo.cli.terminal import console, plain
 
     out = console()
@@ -274,6 +295,10 @@ def _show_sent(
         bom = f"BOM {row['bom'].replace('_', ' ')}" if row["bom"] else ""
         text = ", ".join(filter(None, (row["part_number"], revision, bom, row["remark"])))
         out.print(Text("✓ ", "green").append(plain(f"{row['path']}  {spoken(text)}")))
+        if row["blocked_by"]:
+            out.print(Text(f"  ✗ {spoken(STATUS_WORDS[Status.BLOCKED])}", "red"))
+        for message in row["blocked_by"]:
+            out.print(Text(plain(f"    {spoken(shorten(message, base))}"), "red"))
     for entry in left:
         text = spoken(f"{entry.label} waits in the queue: {entry.reason}")
         out.print(Text("✗ ", "red").append(plain(text)))

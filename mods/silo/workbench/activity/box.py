@@ -50,6 +50,9 @@ class Do(StrEnum):
     INSTALL = "install"  # install the Python packages that are missing
 
 
+_ANSWERS = frozenset({Do.SAME, Do.DECIDE, Do.MEND, Do.SYNC_WITHOUT})
+
+
 @dataclass(frozen=True)
 class Action:
     """A button. ``document`` and ``objects`` are of the CAD model; ``target`` is a page or an id."""
@@ -113,6 +116,12 @@ class PaneEntry:
         object.__setattr__(self, "who", plain(self.who, 60))
         if len(self.lines) > MOST_LINES:
             object.__setattr__(self, "lines", shortened(self.lines))
+
+    @property
+    def asks(self) -> bool:
+        """Return True for a box of this FreeCAD that needs an answer of the user."""
+        actions = (action for line in self.lines for action in line.actions)
+        return bool(self.rank) and (self.tone is Tone.ERROR or any(one.do in _ANSWERS for one in actions))
 
     def without_questions(self, is_answered: Callable[[Action], bool] = lambda _same: True) -> PaneEntry:
         """Drop the buttons of answered questions about copied identities.

@@ -429,7 +429,7 @@ def left_out_box(path: str, along: SentAlong) -> PaneEntry:
     lines = [f"{one.file.place}: {state_words(one.state)}" for one in along.left_out]
     same = sum(one.state.name == "SAME" for one in along.standings)
     rest = translate("Silo", "{n} sent, {same} the same in Silo", n=len(along.queued), same=same)
-    return own_box(f"left-out:{path}:{time.time()}", title, *lines, rest, tone=Tone.WARNING)
+    return own_box(f"left-out:{path}:{time.time()}", title, *lines, rest, tone=Tone.ERROR)
 
 
 def not_in_silo(taken: Snapshot) -> PaneEntry:

@@ -18,7 +18,15 @@ from silo.workbench.activity.feed import gathered
 from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QtCore, QtWidgets
 from silo.workbench.pane.banner import Banner, banner
-from silo.workbench.pane.waiting import WaitingRow, can_send, heading, meant_for_another, rows
+from silo.workbench.pane.waiting import (
+    WaitingRow,
+    can_send,
+    heading,
+    held_heading,
+    held_rows,
+    meant_for_another,
+    rows,
+)
 from silo.workbench.session.state import PaneState
 from silo.workbench.tone import Tone
 from silo.workbench.words import plain, spoken, translate
@@ -29,7 +37,7 @@ FIRST, MORE = 40, 60
 
 def _waits(shown: PaneState) -> object:
     """Return the values from which the waiting entries are drawn."""
-    return shown.waiting, shown.server, shown.theirs, shown.reason
+    return shown.waiting, shown.held, shown.server, shown.theirs, shown.reason
 
 
 class Pane(QtWidgets.QWidget):  # type: ignore[misc]
@@ -301,7 +309,8 @@ class WaitingWidget(QtWidgets.QFrame):  # type: ignore[misc]
     def draw(self, shown: PaneState) -> None:
         """Show the entries that wait."""
         widgets.clear(self._layout)
-        self.setVisible(bool(shown.waiting))
+        self.setVisible(bool(shown.waiting or shown.held))
+        self._held(shown)
         if not shown.waiting:
             self._most = self.MOST
             return
@@ -330,6 +339,17 @@ class WaitingWidget(QtWidgets.QFrame):  # type: ignore[misc]
             send.append(Action(Do.SEND_HERE, text, target=",".join(map(str, away))))
         if send:
             self._layout.addLayout(buttons(send, self._on_action))
+
+    def _held(self, shown: PaneState) -> None:
+        """Show the BOMs that are held."""
+        if not shown.held:
+            return
+        self._layout.addWidget(widgets.label(held_heading(len(shown.held)), bold=True))
+        for row in held_rows(shown.held[: self._most]):
+            self._row(row)
+        if left := len(shown.held[self._most :] if self._most is not None else ()):
+            text = translate("Silo", "… and {n} more", n=left)
+            self._layout.addWidget(widgets.link_button(text, partial(self._show_all, shown)))
 
     def _show_all(self, shown: PaneState) -> None:
         self._most = None

@@ -20,6 +20,7 @@ from silo.workbench.words import counted, plain, spoken, translate
 
 if TYPE_CHECKING:
     from silo.api.pause import Pause
+    from silo.outbox.held_here import HeldHere
     from silo.workbench.colleagues.theirs import Theirs
 
 
@@ -100,6 +101,34 @@ def meant_for_another(entries: Iterable[QueueEntry], server_url: str) -> tuple[i
     """Return the numbers of the entries for another address than the one in use."""
     here = _address(server_url)
     return tuple(entry.id for entry in entries if entry.is_away(here))
+
+
+def held_rows(held: Iterable[HeldHere]) -> tuple[WaitingRow, ...]:
+    """Make a row of each BOM that is held: why, and how it gets into Silo."""
+    return tuple(_held_row(one) for one in held)
+
+
+def _held_row(held: HeldHere) -> WaitingRow:
+    return WaitingRow(
+        title=plain(" ".join(filter(None, (held.part_number, held.label))), 80),
+        what=translate("Silo", "BOM"),
+        state=translate("Silo", "held: {why}", why=spoken(held.why)),
+        since=held.since,
+        urgent=True,
+        actions=(
+            Action(Do.MEND, translate("Silo", "Relink…"), document=held.path),
+            Action(Do.SYNC_WITHOUT, translate("Silo", "Sync without what is missing"), document=held.path),
+        ),
+    )
+
+
+def held_heading(count: int) -> str:
+    """Say how many BOMs are held."""
+    return counted(
+        count,
+        translate("Silo", "{n} BOM is held: Silo has the file, and the BOM of before"),
+        translate("Silo", "{n} BOMs are held: Silo has the files, and the BOMs of before"),
+    )
 
 
 def _address(server_url: str) -> str:

@@ -25,7 +25,7 @@ from silo.workbench.revisions.desk import RevisionDesk
 from silo.workbench.revisions.flow import RevisionFlow
 from silo.workbench.session.session import Session
 from silo.workbench.tone import Tone
-from silo.workbench.words import filled, plain, translate
+from silo.workbench.words import counted, filled, plain, spoken, translate
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
@@ -42,6 +42,8 @@ class ProjectRow:
         FreeCAD has it open, with edits that are not in the file.
     theirs
         the newest revision in Silo, if it is newer than what the file was made from.
+    held
+        why its BOM could not be sent; "" if none is held.
     """
 
     place: str
@@ -50,22 +52,27 @@ class ProjectRow:
     moved_from: str = ""
     edits: bool = False
     theirs: Theirs | None = None
+    held: str = ""
 
     @property
     def is_fine(self) -> bool:
         """Return True if Silo has the file as it is here."""
-        return self.state.name == "SAME" and not self.edits
+        return self.state.name == "SAME" and not self.edits and not self.held
 
     @property
     def tone(self) -> Tone:
         """Return the tone for its state."""
         if self.is_fine:
             return Tone.GOOD
+        if self.held:
+            return Tone.ERROR
         return Tone.WARNING if self.state.name in ("BOTH", "HELD", "SET_BACK", "UNKNOWN") else Tone.CHANGED
 
     def words(self) -> str:
         """Describe its state, for people."""
         row_words = [state_words(self.state)]
+        if self.held:
+            row_words.append(translate("Silo", "its BOM is held: {why}", why=spoken(self.held)))
         if self.edits:
             row_words.append(translate("Silo", "unsaved edits"))
         if self.moved_from:
@@ -98,7 +105,12 @@ class ProjectView:
     def heading(self) -> str:
         """Say how many files there are, and how many of them differ from Silo."""
         left = sum(not row.is_fine for row in self.rows)
-        return translate("Silo", "{n} files, {left} of them different from Silo", n=len(self.rows), left=left)
+        text = translate("Silo", "{n} files, {left} of them different from Silo", n=len(self.rows), left=left)
+        held = sum(bool(row.held) for row in self.rows)
+        if not held:
+            return text
+        one, many = translate("Silo", "{n} BOM is held"), translate("Silo", "{n} BOMs are held")
+        return f"{text}; {counted(held, one, many)}"
 
 
 class ProjectFlow:
@@ -142,6 +154,8 @@ class ProjectFlow:
             return _project_view(root, client, self._session.outbox, edited)
 
         def seen(view: ProjectView) -> None:
+            if any(row.held for row in view.rows):
+                self._session.free_held()
             if look is self._newest:
                 self.view = view
                 done(view)
@@ -218,7 +232,15 @@ def _project_view(root: str, client: SiloClient | None, store: Store, edited: Se
             newest = standing.newest.model_dump(mode="json", exclude={"properties", "links"})
             theirs = theirs_of(file.path, address_of(file, client), newest)
         rows.append(
-            ProjectRow(file.place, file.path, standing.state, file.moved_from, file.path in edited, theirs)
+            ProjectRow(
+                file.place,
+                file.path,
+                standing.state,
+                file.moved_from,
+                file.path in edited,
+                theirs,
+                standing.held,
+            )
         )
     sentences = {
         translate("Silo", "{place} links to {name}, which is not there."): belonging.missing,

@@ -28,13 +28,14 @@ from silo.workbench.words import spoken, translate
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
     from silo.api.pause import Pause
+    from silo.outbox.held_here import HeldHere
     from silo.outbox.report import Sent
     from silo.workbench.colleagues.theirs import Theirs
     from silo.workbench.documents.opened import DocumentOrigin
     from silo.workbench.session.online import Online
 
-    _Looked = tuple[tuple[Waiting, ...], Pause | None]
-    """The outbox entries, and the server's pause; read by a worker."""
+    _Looked = tuple[tuple[Waiting, ...], Pause | None, tuple[HeldHere, ...]]
+    """The outbox entries, the server's pause, and the BOMs that are held; read by a worker."""
 
 
 class Session:
@@ -103,7 +104,9 @@ class Session:
         return server, self._look()
 
     def _look(self) -> _Looked:
-        return self.outbox.entries(), self._online.pause() if self._online is not None else None
+        online = self._online
+        held = self.outbox.held_boms(online.address) if online is not None and online.address else ()
+        return self.outbox.entries(), online.pause() if online is not None else None, held
 
     def _need_online(self) -> Online:
         """Make it when a worker first needs it, because its import would delay FreeCAD's start."""
@@ -128,6 +131,8 @@ class Session:
         self._waits(looked)
         if looked[0] and server.configured:
             self.send(force=False)
+        if looked[2]:
+            self.free_held()
 
     def _connection(self, kind: str, reason: str) -> None:
         before = self.shown.connection
@@ -328,13 +333,13 @@ class Session:
 
     def _waits(self, looked: _Looked, **more: Any) -> None:
         """Show what waits. A worker finds out what colleagues changed, if commits are held because of it."""
-        waiting, pause = looked
+        waiting, pause, held = looked
         asked = {entry.id: entry for entry in waiting if entry.newer and entry.path}
         their_versions = {
             number: their_version for number, their_version in self.shown.theirs.items() if number in asked
         }
         self._outbox_failed = False
-        self._show(waiting=waiting, pause=pause, theirs=their_versions, **more)
+        self._show(waiting=waiting, pause=pause, held=held, theirs=their_versions, **more)
         left = [entry for number, entry in asked.items() if number not in their_versions]
         if not left or self._comparing:
             return
@@ -355,6 +360,20 @@ class Session:
 
         self._comparing = True
         self.ask(translate("Silo", "Comparing with Silo"), compare, done, failed)
+
+    def free_held(self) -> None:
+        """Send the BOMs that were held and can go now."""
+
+        def look(client: SiloClient, _control: Control) -> int:
+            from silo.vault.project import free_held  # late: FreeCAD's start waits for this module
+
+            return free_held(client, self.outbox)
+
+        def done(count: int) -> None:
+            if count:
+                self.send(force=False)
+
+        self.ask(translate("Silo", "Looking at held BOMs"), look, done, failed=lambda _error: None)
 
     # -- anything else that asks the server -------------------------------------------------------------
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from silo.outbox.entry import Entry as Waiting
+from silo.outbox.entry import State
 from silo.workbench.activity.feed import Activity
 from silo.workbench.colleagues.announced import Newer
 from silo.workbench.session.worker import Busy
@@ -15,6 +16,7 @@ from silo.workbench.settings.server import ServerChoice
 
 if TYPE_CHECKING:
     from silo.api.pause import Pause
+    from silo.outbox.held_here import HeldHere
     from silo.outbox.report import Sent
     from silo.workbench.colleagues.theirs import Theirs
 
@@ -25,6 +27,8 @@ class PaneState:
 
     waiting
         all that is in the outbox, oldest first.
+    held
+        the BOMs of this computer that Silo lacks, because they cannot be sent.
     pause
         why nothing is sent to the server now; None where nothing keeps it.
     theirs
@@ -41,11 +45,19 @@ class PaneState:
     reason: str = ""
     busy: Busy | None = None
     waiting: tuple[Waiting, ...] = ()
+    held: tuple[HeldHere, ...] = ()
     pause: Pause | None = None
     theirs: Mapping[int, Theirs | None] = field(default_factory=dict)
     activity: Activity = field(default_factory=Activity)
     newer: Mapping[str, Newer] = field(default_factory=dict)
     presence: tuple[str, ...] = ()
+
+    def questions(self) -> frozenset[str]:
+        """Return the keys of all that needs an answer of the user: commits, BOMs, and boxes that ask."""
+        urgent = {f"commit {entry.id}" for entry in self.waiting if entry.state is State.HELD}
+        boms = {f"BOM {held.identity} {held.why}" for held in self.held}
+        boxes = {f"box {entry.key}" for entry in self.activity.entries if entry.asks}
+        return frozenset(urgent | boms | boxes)
 
 
 @dataclass(frozen=True)
