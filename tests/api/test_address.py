@@ -24,6 +24,8 @@ from silo.bom.errors import ConfigError, InputError
         ("[::1]:8000", "http://[::1]:8000/api", "http://[::1]:8000"),
         ("http://[::1]:80", "http://[::1]/api", "http://[::1]"),
         ("http://[::1]:443", "http://[::1]:443/api", "http://[::1]:443"),
+        ("http://[0:0:0:0:0:0:0:1]:8000", "http://[::1]:8000/api", "http://[::1]:8000"),
+        ("http://[2001:DB8:0::00A]", "http://[2001:db8::a]/api", "http://[2001:db8::a]"),
         # What waits for a server is found by its address: each spelling is the same one.
         ("HTTPS://Silo.Example.COM:443/", "https://silo.example.com/api", "https://silo.example.com"),
         (" https://silo.example.com.// ", "https://silo.example.com/api", "https://silo.example.com"),

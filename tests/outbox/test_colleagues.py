@@ -575,3 +575,51 @@ def test_a_commit_made_from_an_older_revision_of_ours_is_no_set_back(vault: Vaul
     assert "restored from a backup" not in held(vault).reason
     vault.send(force=True)
     assert vault.files() == [b"one", b"two"]
+
+
+class Unchecked(FakeSilo):
+    """A Silo without a base check: it takes any file, and keeps no base."""
+
+    def upload_file(self, *arguments: Any, **more: Any) -> Revision:
+        origin = more.pop("origin", None)
+        bare = None if origin is None else Origin(file_path=origin.file_path, links=origin.links)
+        return super().upload_file(*arguments, origin=bare, **more)
+
+
+def test_a_colleagues_revision_between_look_and_upload_is_a_conflict_afterwards(vault: Vault) -> None:
+    """A server without a base check has undone it: the commit says whose it was, and is no success."""
+    sent(vault, b"one", bom=True)
+    vault.silo.__class__ = Unchecked
+    mine(vault, b"two", b"one")
+    once(vault, "upload_file", lambda: theirs(vault, b"theirs", 1))
+    vault.send()
+    assert vault.files() == [b"one", b"theirs", b"two"]
+    (told,) = [one for one in vault.told if one.undone]
+    assert [one.revision_number for one in told.undone] == [2]
+    assert "alice committed revision 2 while this was sent as revision 3" in told.conflict
+
+
+def priced(vault: Vault) -> None:
+    """Another user changes the item alone."""
+    vault.silo.update_item(vault.number, properties={"standard_cost": 1}, comment="a price")
+
+
+def test_a_change_of_properties_between_look_and_upload_is_no_conflict(vault: Vault) -> None:
+    """A revision without a file undoes no file."""
+    sent(vault, b"one", bom=True)
+    vault.silo.__class__ = Unchecked
+    mine(vault, b"two", b"one")
+    once(vault, "upload_file", lambda: priced(vault))
+    vault.send()
+    assert vault.files() == [b"one", b"two"]
+    assert not any(told.undone for told in vault.told)
+
+
+def test_a_server_that_checks_the_base_tells_of_no_conflict_afterwards(vault: Vault) -> None:
+    """It refuses the upload, and the commit is held as before."""
+    sent(vault, b"one", bom=True)
+    mine(vault, b"two", b"one")
+    once(vault, "upload_file", lambda: theirs(vault, b"theirs", 1))
+    vault.send()
+    assert vault.files() == [b"one", b"theirs"]
+    assert not any(told.undone for told in vault.told)

@@ -92,8 +92,8 @@ OF_ALL: dict[str, tuple[SiloError, str, int]] = {
     "429 for ten minutes": (answered(429, Retry_After="600"), "upload_file", 30),
     "503 for ten minutes": (answered(503, Retry_After="600"), "upload_file", 30),
     "read-only": (answered(503, b'{"error": "read-only"}'), "upload_file", 45),
-    "wrong token": (answered(401), "", 1),
-    "a login page": (AuthError("silo wants a login"), "", 1),
+    "wrong token": (answered(401), "", 13),
+    "a login page": (AuthError("silo wants a login"), "", 13),
     "nothing answers": (NotSentError("refused"), "", 70),
     "502 from a proxy": (answered(502), "", 140),
 }
@@ -124,6 +124,22 @@ def test_a_server_in_trouble_is_left_alone(desk: Desk, kind: str) -> None:
     desk.mood = lambda _name: None
     assert desk.send(force=True).pause is None
     assert (desk.store.entries(), set(desk.arrived().values())) == ((), {(13, 1), (1, 1)})
+
+
+def test_a_token_that_was_refused_for_a_while_is_tried_again_slowly(desk: Desk) -> None:
+    """A proxy without its log-in service, a server that is being restored: no user has to press anything."""
+    desk.mood = lambda _name: _raise(answered(401))
+    for number in desk.numbers:
+        desk.commit(number)
+    first = desk.send().pause
+    assert first is not None
+    assert 300.0 <= first.left(desk.now) <= 900.0
+    desk.mood = lambda _name: None
+    desk.now += 299.0
+    assert desk.send().sent == []
+    desk.now += 601.0
+    assert desk.send().pause is None
+    assert desk.store.entries() == ()
 
 
 def test_one_item_in_trouble_is_left_alone_too(desk: Desk) -> None:

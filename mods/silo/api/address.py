@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from ipaddress import ip_address
 from urllib.parse import SplitResult, quote, urljoin, urlsplit
 
 from silo.bom.errors import ConfigError, InputError
@@ -27,7 +28,7 @@ def origin_of(url: str) -> Origin:
     Raises :class:`ConfigError` if it is no http(s) URL.
     """
     parts = _http(url)
-    return (parts.scheme, parts.hostname or "", parts.port or _DEFAULT_PORTS[parts.scheme])
+    return (parts.scheme, _one_spelling(parts.hostname or ""), parts.port or _DEFAULT_PORTS[parts.scheme])
 
 
 def may_carry_token(sender: Origin, receiver: Origin) -> bool:
@@ -81,7 +82,7 @@ class ServerAddress:
                 )
             )
         path = re.sub("/+", "/", parts.path).rstrip("/")
-        host = (parts.hostname or "").rstrip(".")
+        host = _one_spelling((parts.hostname or "").rstrip("."))
         port = f":{parts.port}" if parts.port not in (None, _DEFAULT_PORTS[parts.scheme]) else ""
         bare = f"{parts.scheme}://[{host}]{port}" if ":" in host else f"{parts.scheme}://{host}{port}"
         if not path:
@@ -129,6 +130,16 @@ class ServerAddress:
                 message("{url}: this page is not on {host}; it is not opened", url=url, host=self.host)
             )
         return url
+
+
+def _one_spelling(host: str) -> str:
+    """Return the short form of an IPv6 address, which has several; any other host as it is."""
+    if ":" not in host:
+        return host
+    try:
+        return ip_address(host).compressed
+    except ValueError:
+        return host
 
 
 def _http(url: str) -> SplitResult:

@@ -166,6 +166,10 @@ class Backoff:
 QUEUE_PAUSES = Backoff(first=5.0, longest=900.0)
 
 
+REFUSED_PAUSES = Backoff(first=600.0, longest=900.0)
+"""After a refused token: 5 to 15 minutes, unless a user acts before."""
+
+
 def pause_after(
     error: SiloError, before: Pause | None, now: float, backoff: Backoff, chance: float, failures: int = 0
 ) -> Pause:
@@ -175,10 +179,11 @@ def pause_after(
     """
     failures = max(failures, before.failures if before is not None else 0) + 1
     wait = told_wait(error)
-    refused = isinstance(error, AuthError | ConfigError)
+    if isinstance(error, AuthError):  # a token may be refused for a while: the proxy, a restore, a rotation
+        backoff = REFUSED_PAUSES
     if isinstance(error, UnreachableError):  # a user who is back in the network wants to see it soon
         backoff = replace(backoff, longest=max(backoff.first, min(backoff.longest, 60.0)))
-    until = math.inf if refused else now + backoff.pause(failures, chance, wait)
+    until = math.inf if isinstance(error, ConfigError) else now + backoff.pause(failures, chance, wait)
     if before is not None and before.until > until:
         return before
     return Pause(until, str(error), error.code, failures, wait is not None)

@@ -10,6 +10,7 @@ from silo.api.pause import Pause
 from silo.api.wire import MergeResult, ProductSummary, Revision
 from silo.bom.compare.merge import MergePlan
 from silo.bom.errors import SiloError
+from silo.bom.message import message
 from silo.bom_sync.resolved import Resolved
 from silo.bom_sync.steps import Status
 from silo.outbox.entry import Entry
@@ -29,6 +30,9 @@ class Sent:
         names the BOM's merge; "" where there was none to sync.
     uploaded
         the revision that the file became, as the server answered.
+    undone
+        colleagues' revisions that came between the look and the upload, and that the file undoes: a server
+        without a check of the base takes it anyway.
     summary
         what the server keeps of the product then; None where it does not say.
     """
@@ -42,12 +46,28 @@ class Sent:
     revision: int | None = None
     sync_id: str = ""
     uploaded: Revision | None = None
+    undone: tuple[Revision, ...] = ()
     summary: ProductSummary | None = None
 
     @property
     def number(self) -> str:
         """Return the item's part number; "" for a document without one."""
         return "" if isinstance(self.part_number, DocumentId) else self.part_number
+
+    @property
+    def conflict(self) -> str:
+        """Say whose revisions the file undoes, and what to do; "" if it undoes none."""
+        if not self.undone:
+            return ""
+        newest = self.undone[-1]
+        who = newest.created_by or "somebody"
+        return message(
+            "{who} committed revision {theirs} while this was sent as revision {mine}, which does not have "
+            "it: this Silo does not check it. Look at revision {theirs}, and commit what both of you changed",
+            who=who,
+            theirs=newest.revision_number,
+            mine=self.revision or 0,
+        )
 
     @property
     def page(self) -> str:

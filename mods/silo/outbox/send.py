@@ -374,9 +374,26 @@ class _SendRun:
                 cancelled=self.cancelled,
             )
             base = self._base(entry, self._revisions(sent.part_number)) if mine is None else None
+        before = max(newest_number(newest), entry.base_revision or 0)
         revision = mine or self._upload(entry, base)
+        undone = () if mine or base is None else self._undone(sent.part_number, before, revision)
         there = self._arrived(entry, revision, revision.base_revision)
-        return replace(sent, entry=there, revision=there.revision, uploaded=revision)
+        return replace(sent, entry=there, revision=there.revision, uploaded=revision, undone=undone)
+
+    def _undone(self, part_number: str, before: int, made: Revision) -> tuple[Revision, ...]:
+        """Return what colleagues committed after the look and before the upload, oldest first."""
+        if made.revision_number <= before + 1 or made.base_revision is not None:
+            return ()  # a server that keeps the base has checked it
+        try:
+            later = self._revisions(part_number, after=before)
+        except SiloError:
+            later = [Revision(revision_number=made.revision_number - 1)]
+        between = [one for one in later if before < one.revision_number < made.revision_number]
+        named = [
+            one for one in between if one.file_name or one.file_checksum or one.file_key or one.file_size
+        ]
+        told = any(one.file_name or one.file_checksum for one in later)
+        return tuple(sorted(named if told else between, key=lambda one: one.revision_number))
 
     def _arrived(self, entry: Entry, revision: Revision, base: int | None = None) -> Entry:
         number = revision.revision_number

@@ -64,7 +64,7 @@ class AddOn:
         self._window: Any = None
         self._refreshing = False
         self._signs: Any = None
-        self._asked: frozenset[str] = frozenset()
+        self._asked: frozenset[tuple[str, str]] = frozenset()
         self._timer: Any = None
         self._watch: Any = None
 

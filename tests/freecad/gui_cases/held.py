@@ -9,12 +9,12 @@ from typing import Any
 from inside import (
     App,
     Gui,
+    QtCore,
     QtWidgets,
     addon,
     assembly,
     boxes,
     close_all,
-    commit,
     labels,
     part,
     picture,
@@ -33,13 +33,14 @@ def sign() -> Any:
 
 def tips() -> list[str]:
     """The tips of the documents in FreeCAD's tree."""
-    trees = [
-        tree
-        for tree in Gui.getMainWindow().findChildren(QtWidgets.QTreeWidget)
-        if tree.metaObject().className() == "Gui::TreeWidget" and tree.topLevelItemCount()
-    ]
-    tops = [tree.topLevelItem(0) for tree in trees]
-    return [top.child(row).toolTip(0) for top in tops for row in range(top.childCount())]
+    found = []
+    for tree in Gui.getMainWindow().findChildren(QtWidgets.QTreeWidget):
+        model = tree.model()
+        if tree.metaObject().className() == "Gui::TreeWidget" and model.rowCount():
+            top = model.index(0, 0)
+            rows = (model.index(row, 0, top) for row in range(model.rowCount(top)))
+            found += [str(model.data(row, QtCore.Qt.ItemDataRole.ToolTipRole) or "") for row in rows]
+    return found
 
 
 def story() -> None:
@@ -53,7 +54,8 @@ def story() -> None:
     one.dock.hide()
     doc = App.openDocument(path)
     doc.getObject("B1").Placement.Base.x += 5
-    commit(doc)
+    App.setActiveDocument(doc.Name)
+    Gui.runCommand("Origin_Commit")
     wait(lambda: one.session.shown.held and settled())
     wait(lambda: sign() is not None and sign().isVisible())
     wait(lambda: any("held" in tip for tip in tips()))

@@ -133,7 +133,10 @@ def run_commit(args: argparse.Namespace) -> int:
     else:
         _show_sent(report, sent, left, behind, belonging.project.root)
         _show_models(models, undrawn)
-    done = not (left or behind or incomplete or _unsound(belonging) or report.stopped_by or report.busy)
+    undone = [one for one in report.sent if one.entry.key in mine and one.undone]
+    done = not (
+        left or behind or incomplete or undone or _unsound(belonging) or report.stopped_by or report.busy
+    )
     return exit_of(away) if away else Exit.DONE if done else Exit.UNDONE
 
 
@@ -172,7 +175,7 @@ def _sent(report: Report, mine: set[str]) -> list[dict[str, Any]]:
             "part_number": file.number,
             "revision": file.revision if file.entry.has_file else None,
             "bom": file.status.value if file.status is not None else None,
-            "remark": file.entry.remark or draft_text(file.result or file.uploaded),
+            "remark": file.conflict or file.entry.remark or draft_text(file.result or file.uploaded),
             "blocked_by": [one.message for one in _blocking(file)],
         }
         for file in report.sent

@@ -33,7 +33,7 @@ from silo.workbench.activity.box import (
 )
 from silo.workbench.activity.links import Page, view_actions
 from silo.workbench.tone import Tone
-from silo.workbench.words import counted, filled, plain, quantity, translate
+from silo.workbench.words import counted, filled, plain, quantity, spoken, translate
 
 
 def of_sent(sent: Sent, page: Page, now: float | None = None) -> PaneEntry:
@@ -111,6 +111,8 @@ def _revision_lines(sent: Sent) -> tuple[EntryLine, ...]:
 
 def _status_lines(sent: Sent) -> tuple[EntryLine, ...]:
     lines = []
+    if sent.conflict:
+        lines.append(EntryLine(spoken(sent.conflict), Tone.ERROR))
     if sent.entry.remark:
         lines.append(EntryLine(sent.entry.remark, Tone.WARNING))
     if draft := draft_text(sent.result or sent.uploaded, translate):

@@ -39,7 +39,7 @@ _MOST = 12
 
 def sign_text(shown: PaneState) -> str:
     """Say what needs an answer, shortly; "" if nothing does."""
-    other = sum(not key.startswith(("BOM ", "box ")) for key in shown.questions())
+    other = sum(kind == "commit" for kind, _key in shown.questions())
     texts = [
         counted(n, one, many)
         for n, one, many in (

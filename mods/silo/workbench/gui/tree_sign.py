@@ -10,9 +10,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from silo.workbench.gui.qt import QtGui, QtWidgets
+from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets
 
 _RED = "#d02030"
+_TEXT = QtCore.Qt.ItemDataRole.DisplayRole
+_TIP = QtCore.Qt.ItemDataRole.ToolTipRole
+_ICON = QtCore.Qt.ItemDataRole.DecorationRole
 
 
 class TreeSign:
@@ -26,23 +29,25 @@ class TreeSign:
         """Mark the documents of these labels, each with its reason; all others lose their mark."""
         if not why and not self._marked:
             return
-        for item in self._documents():
-            label = item.text(0)
+        for model, index in self._documents():
+            label = str(model.data(index, _TEXT))
             if label in why:
-                item.setToolTip(0, why[label])
-                item.setIcon(0, with_corner(self._plain_icon()))
+                model.setData(index, why[label], _TIP)
+                model.setData(index, with_corner(self._plain_icon()), _ICON)
             elif label in self._marked:
-                item.setToolTip(0, "")
-                item.setIcon(0, self._plain_icon())
+                model.setData(index, "", _TIP)
+                model.setData(index, self._plain_icon(), _ICON)
         self._marked = dict(why)
 
-    def _documents(self) -> Iterator[Any]:
+    def _documents(self) -> Iterator[tuple[Any, Any]]:
+        # By the model: PySide's own objects for the items of a tree that C++ made do not live long enough.
         for tree in self._window.findChildren(QtWidgets.QTreeWidget):
             if tree.metaObject().className() != "Gui::TreeWidget":
                 continue
-            for at in range(tree.topLevelItemCount()):
-                top = tree.topLevelItem(at)
-                yield from (top.child(row) for row in range(top.childCount()))
+            model = tree.model()
+            for at in range(model.rowCount()):
+                top = model.index(at, 0)
+                yield from ((model, model.index(row, 0, top)) for row in range(model.rowCount(top)))
 
     @staticmethod
     def _plain_icon() -> Any:

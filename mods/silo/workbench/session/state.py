@@ -52,11 +52,11 @@ class PaneState:
     newer: Mapping[str, Newer] = field(default_factory=dict)
     presence: tuple[str, ...] = ()
 
-    def questions(self) -> frozenset[str]:
+    def questions(self) -> frozenset[tuple[str, str]]:
         """Return the keys of all that needs an answer of the user: commits, BOMs, and boxes that ask."""
-        urgent = {f"commit {entry.id}" for entry in self.waiting if entry.state is State.HELD}
-        boms = {f"BOM {held.identity} {held.why}" for held in self.held}
-        boxes = {f"box {entry.key}" for entry in self.activity.entries if entry.asks}
+        urgent = {("commit", str(entry.id)) for entry in self.waiting if entry.state is State.HELD}
+        boms = {("BOM", held.identity + held.why) for held in self.held}
+        boxes = {("box", entry.key) for entry in self.activity.entries if entry.asks}
         return frozenset(urgent | boms | boxes)
 
 

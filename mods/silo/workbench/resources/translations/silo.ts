@@ -122,6 +122,7 @@
         </message>
         <message>
             <location filename="../../activity/sent.py" />
+            <location filename="../../pane/waiting.py" />
             <source>Relink…</source>
             <translation type="unfinished" />
         </message>
@@ -689,6 +690,26 @@ Commits that are not copied by then may have to be committed again.</source>
             <translation type="unfinished" />
         </message>
         <message>
+            <location filename="../../gui/status_sign.py" />
+            <source>{n} BOM held</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/status_sign.py" />
+            <source>{n} BOMs held</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/status_sign.py" />
+            <source>{n} commit asks</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/status_sign.py" />
+            <source>{n} commits ask</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
             <location filename="../../gui/widgets.py" />
             <location filename="../../mass/dialog.py" />
             <location filename="../../preview/dialog.py" />
@@ -958,6 +979,32 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../pane/waiting.py" />
             <source>, {urgent} of them for your choice</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <location filename="../../../outbox/status_text.py" />
+            <source>BOM</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>held: {why}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>Sync without what is missing</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>{n} BOM is held: Silo has the file, and the BOM of before</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>{n} BOMs are held: Silo has the files, and the BOMs of before</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -2075,6 +2122,11 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../revisions/project.py" />
+            <source>its BOM is held: {why}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/project.py" />
             <source>unsaved edits</source>
             <translation type="unfinished" />
         </message>
@@ -2086,6 +2138,16 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../revisions/project.py" />
             <source>{n} files, {left} of them different from Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/project.py" />
+            <source>{n} BOM is held</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/project.py" />
+            <source>{n} BOMs are held</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -2181,6 +2243,11 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../session/session.py" />
             <source>Outbox</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../session/session.py" />
+            <source>Looking at held BOMs</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -2582,11 +2649,6 @@ They are installed in {folder}.</source>
         <message>
             <location filename="../../../outbox/status_text.py" />
             <source>file and BOM</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../../outbox/status_text.py" />
-            <source>BOM</source>
             <translation type="unfinished" />
         </message>
         <message>

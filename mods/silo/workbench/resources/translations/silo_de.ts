@@ -122,6 +122,7 @@
         </message>
         <message>
             <location filename="../../activity/sent.py" />
+            <location filename="../../pane/waiting.py" />
             <source>Relink…</source>
             <translation>Neu verknüpfen…</translation>
         </message>
@@ -690,6 +691,26 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
             <translation>Schließen, ohne zu warten</translation>
         </message>
         <message>
+            <location filename="../../gui/status_sign.py" />
+            <source>{n} BOM held</source>
+            <translation>{n} Stückliste zurückgehalten</translation>
+        </message>
+        <message>
+            <location filename="../../gui/status_sign.py" />
+            <source>{n} BOMs held</source>
+            <translation>{n} Stücklisten zurückgehalten</translation>
+        </message>
+        <message>
+            <location filename="../../gui/status_sign.py" />
+            <source>{n} commit asks</source>
+            <translation>{n} Commit fragt</translation>
+        </message>
+        <message>
+            <location filename="../../gui/status_sign.py" />
+            <source>{n} commits ask</source>
+            <translation>{n} Commits fragen</translation>
+        </message>
+        <message>
             <location filename="../../gui/widgets.py" />
             <location filename="../../mass/dialog.py" />
             <location filename="../../preview/dialog.py" />
@@ -960,6 +981,32 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
             <location filename="../../pane/waiting.py" />
             <source>, {urgent} of them for your choice</source>
             <translation>, {urgent} davon auf Ihre Entscheidung</translation>
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <location filename="../../../outbox/status_text.py" />
+            <source>BOM</source>
+            <translation>Stückliste</translation>
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>held: {why}</source>
+            <translation>zurückgehalten: {why}</translation>
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>Sync without what is missing</source>
+            <translation>Ohne das Fehlende abgleichen</translation>
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>{n} BOM is held: Silo has the file, and the BOM of before</source>
+            <translation>{n} Stückliste wird zurückgehalten: Silo hat die Datei und die Stückliste von davor</translation>
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>{n} BOMs are held: Silo has the files, and the BOMs of before</source>
+            <translation>{n} Stücklisten werden zurückgehalten: Silo hat die Dateien und die Stücklisten von davor</translation>
         </message>
         <message>
             <location filename="../../pane/waiting.py" />
@@ -2076,6 +2123,11 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../revisions/project.py" />
+            <source>its BOM is held: {why}</source>
+            <translation>ihre Stückliste wird zurückgehalten: {why}</translation>
+        </message>
+        <message>
+            <location filename="../../revisions/project.py" />
             <source>unsaved edits</source>
             <translation>ungespeicherte Änderungen</translation>
         </message>
@@ -2088,6 +2140,16 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
             <location filename="../../revisions/project.py" />
             <source>{n} files, {left} of them different from Silo</source>
             <translation>{n} Dateien, {left} davon nicht wie hier in Silo</translation>
+        </message>
+        <message>
+            <location filename="../../revisions/project.py" />
+            <source>{n} BOM is held</source>
+            <translation>{n} Stückliste wird zurückgehalten</translation>
+        </message>
+        <message>
+            <location filename="../../revisions/project.py" />
+            <source>{n} BOMs are held</source>
+            <translation>{n} Stücklisten werden zurückgehalten</translation>
         </message>
         <message>
             <location filename="../../revisions/project.py" />
@@ -2183,6 +2245,11 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
             <location filename="../../session/session.py" />
             <source>Outbox</source>
             <translation>Postausgang</translation>
+        </message>
+        <message>
+            <location filename="../../session/session.py" />
+            <source>Looking at held BOMs</source>
+            <translation>Sieht nach zurückgehaltenen Stücklisten</translation>
         </message>
         <message>
             <location filename="../../settings/connection_test.py" />
@@ -2585,11 +2652,6 @@ Sie werden in {folder} installiert.</translation>
             <location filename="../../../outbox/status_text.py" />
             <source>file and BOM</source>
             <translation>Datei und Stückliste</translation>
-        </message>
-        <message>
-            <location filename="../../../outbox/status_text.py" />
-            <source>BOM</source>
-            <translation>Stückliste</translation>
         </message>
         <message>
             <location filename="../../../outbox/status_text.py" />
