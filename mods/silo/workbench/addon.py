@@ -10,7 +10,7 @@ from functools import cached_property
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from silo.platform import one_path
+from silo.platform.spelling import one_path
 from silo.workbench.freecad import host
 from silo.workbench.gui import qt
 from silo.workbench.pane.dock import ActivityDock
