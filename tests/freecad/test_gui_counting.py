@@ -50,6 +50,14 @@ def test_what_is_no_part_is_one_press_and_another_takes_it_back(said: dict[str, 
     assert said["asked_again"]
 
 
+def test_a_hidden_body_is_answered_by_one_press_each_way(said: dict[str, Any]) -> None:
+    """The table says what it is, and the object keeps the answer."""
+    assert said["offered_0"] == [True, "hidden, does not count"]
+    assert said["offered_1"] == [True, "hidden, counts"]
+    assert said["answered"] == [False, True]
+    assert said["words"].startswith("References from now on, not counted: Jig.")
+
+
 def test_a_missing_part_has_both_ways_out_in_the_pane(said: dict[str, Any]) -> None:
     """The BOM waits; a person syncs it without the part, or has the link mended."""
     assert "[Relink…] [Sync without it]" in said["waits"]
@@ -67,8 +75,9 @@ def test_the_preview_says_why_a_line_counts_so_many(said: dict[str, Any]) -> Non
     assert (said["line"], said["why"]) == ("1", "1 × Bolt in Assembly:\nFirst")
 
 
-def test_what_no_line_explains_is_selected_in_the_view(said: dict[str, Any]) -> None:
+def test_the_comparison_with_the_view_takes_what_a_finding_names(said: dict[str, Any]) -> None:
+    """A visible original lies where its array shows it: a finding names it, so nothing differs."""
     assert "the BOM explains" in said["agrees"]
     assert ("They differ" in said["agrees"], said["selected"]) == (False, [])
-    assert "They differ" in said["differs"]
-    assert said["selection"] == ["First"]
+    assert "1 left out as the findings say" in said["differs"]
+    assert said["selection"] == []

@@ -412,7 +412,7 @@ class FindingCode(StrEnum):
     )
 
 
-class Standing(StrEnum):
+class HiddenStanding(StrEnum):
     """What the count makes of a hidden object."""
 
     COUNTS = "counts"

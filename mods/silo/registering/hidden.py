@@ -6,7 +6,7 @@ These are what the finding ``hidden`` names, and what the file already has an an
 
 from __future__ import annotations
 
-from silo.bom.findings import FindingCode, Place, Standing
+from silo.bom.findings import FindingCode, HiddenStanding, Place
 from silo.bom.walk.document import label_of, object_name, own
 from silo.bom.walk.kinds import COMPONENTS, INLINE, Kind
 from silo.bom.walk.links import extract
@@ -28,5 +28,5 @@ def hidden_in(path: str, assembly: str | None = None) -> list[Place]:
         for obj, _ in survey_of(top.Document).of(_ANSWERABLE, known):
             if own(obj, "SiloBomExclude") is True:
                 file = top.Document.FileName
-                places.append(Place(file, object_name(obj), label_of(obj), Standing.REFERENCE.value))
+                places.append(Place(file, object_name(obj), label_of(obj), HiddenStanding.REFERENCE.value))
         return places

@@ -11,6 +11,8 @@ from inside import (
     VAULT,
     App,
     Gui,
+    QtCore,
+    QtWidgets,
     assembly,
     button_texts,
     close,
@@ -37,6 +39,7 @@ def story() -> None:
     one = ready()
     top = build()
     declare(top)
+    hidden_pieces(top)
     close_all()
     moved_part(one)
 
@@ -107,6 +110,43 @@ def declare(doc: Any) -> None:
     tell(left="SiloItemId" in motor.PropertiesList and bool(motor.SiloItemId), meta=sorted(doc.Meta))
 
 
+def hidden_pieces(doc: Any) -> None:
+    """The jig is hidden: one press counts it, another makes it a reference, and the table says so."""
+    doc.getObject("Jig").Visibility = False
+    window = preview(doc)
+    window.resize(1000, 520)
+    answered = []
+    for button in (window.count_button, window.reference_button):
+        row = hidden_row(window, "Jig")
+        window.table.setCurrentItem(row)
+        tell(
+            **{
+                f"offered_{len(answered)}": [
+                    button.isVisibleTo(window),
+                    row.text(window.table.columnCount() - 1),
+                ]
+            }
+        )
+        if not answered:
+            picture(window, "hidden")
+        before = window._preview
+        button.click()
+        wait(lambda before=before: window._preview is not None and window._preview is not before)
+        answered.append(doc.getObject("Jig").SiloBomExclude)
+    picture(window, "answered")
+    tell(answered=answered, words=window._view_text.text())
+    close(window)
+
+
+def hidden_row(window: Any, name: str) -> Any:
+    items = QtWidgets.QTreeWidgetItemIterator(window.table)
+    while (item := items.value()) is not None:
+        if item.text(1) == name and item.data(1, QtCore.Qt.ItemDataRole.UserRole) == "hidden":
+            return item
+        items += 1
+    raise AssertionError(f"no row of {name}")
+
+
 def moved_part(one: Any) -> None:
     (VAULT / "moved").mkdir()
     os.replace(VAULT / "Bolt.FCStd", VAULT / "moved" / "Bolt.FCStd")
@@ -126,7 +166,7 @@ def moved_part(one: Any) -> None:
     tell(line=line.text(2), why=window._view_text.text())
     window.verify_button.click()
     tell(agrees=window._view_text.text(), selected=[obj.Name for obj in Gui.Selection.getSelection()])
-    # A Draft array whose original nobody hid: the view has one more than the BOM says.
+    # A Draft array whose original is visible: the view has one more than the BOM says.
     array = Draft.make_ortho_array(
         top.getObject("First"), App.Vector(50, 0, 0), App.Vector(0, 9, 0), App.Vector(), 3, 1, 1
     )

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from silo.bom.entry import BomEntry, Extraction
-from silo.bom.findings import Finding, FindingCode, Place, Severity, Standing
+from silo.bom.findings import Finding, FindingCode, HiddenStanding, Place, Severity
 from silo.testing import FakeSilo
 from silo.workbench.documents.snapshot import Snapshot
 from silo.workbench.preview.comparison import ask
@@ -66,9 +66,9 @@ def test_what_is_hidden_is_a_sentence_with_a_row_for_each_object(silo: FakeSilo)
     where = tuple(
         Place("/v/Top.FCStd", name, f"my {name}", standing.value)
         for name, standing in (
-            ("L", Standing.COUNTS),
-            ("B", Standing.NOT_COUNTED),
-            ("R", Standing.REFERENCE),
+            ("L", HiddenStanding.COUNTS),
+            ("B", HiddenStanding.NOT_COUNTED),
+            ("R", HiddenStanding.REFERENCE),
         )
     )
     finding = Finding(FindingCode.HIDDEN, Severity.WARNING, "Hidden in Top: …", where)

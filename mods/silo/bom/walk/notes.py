@@ -12,7 +12,7 @@ from typing import Any
 
 from silo.bom.entry import BomEntry
 from silo.bom.errors import DocumentError, listed
-from silo.bom.findings import Finding, FindingCode, Place, Severity, Standing
+from silo.bom.findings import Finding, FindingCode, HiddenStanding, Place, Severity
 from silo.bom.items.naming import display_name
 from silo.bom.message import Message, counted_message, joined, message, template
 from silo.bom.walk.document import DocumentRoot, LinkProblem, label_of, object_name, saved_by
@@ -229,15 +229,19 @@ class Notes:
     ) -> None:
         """Say in one sentence which hidden objects of an assembly count, and which do not."""
         groups = (
-            (counted, Standing.COUNTS, counted_message(len(counted), "{n} piece counts", "{n} pieces count")),
+            (
+                counted,
+                HiddenStanding.COUNTS,
+                counted_message(len(counted), "{n} piece counts", "{n} pieces count"),
+            ),
             (
                 not_counted,
-                Standing.NOT_COUNTED,
+                HiddenStanding.NOT_COUNTED,
                 counted_message(len(not_counted), "{n} body does not", "{n} bodies do not"),
             ),
             (
                 references,
-                Standing.REFERENCE,
+                HiddenStanding.REFERENCE,
                 counted_message(
                     len(references),
                     "{n} link is only a reference and does not",

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from silo.bom.compare.bom_diff import BomDiff
 from silo.bom.entry import BomEntry
-from silo.bom.findings import Finding, FindingCode, Severity, Standing
+from silo.bom.findings import Finding, FindingCode, HiddenStanding, Severity
 from silo.bom.items.naming import display_name, own_part_name
 from silo.bom.view.folders import shorten
 from silo.bom.walk.document import relative
@@ -284,15 +284,15 @@ def _hidden_row(finding: Finding, base: str) -> PreviewRow:
     """
     document = finding.where[0].doc_path if finding.where else ""
     words = {
-        Standing.COUNTS: translate("Silo", "hidden, counts"),
-        Standing.NOT_COUNTED: translate("Silo", "hidden, does not count"),
-        Standing.REFERENCE: translate("Silo", "hidden, only a reference: does not count"),
+        HiddenStanding.COUNTS: translate("Silo", "hidden, counts"),
+        HiddenStanding.NOT_COUNTED: translate("Silo", "hidden, does not count"),
+        HiddenStanding.REFERENCE: translate("Silo", "hidden, only a reference: does not count"),
     }
     children = tuple(
         PreviewRow(
             RowKind.HIDDEN,
             name=place.label or place.obj,
-            note=words.get(Standing(place.standing), "") if place.standing else "",
+            note=words.get(HiddenStanding(place.standing), "") if place.standing else "",
             document=place.doc_path,
             objects=(place.obj,),
         )
@@ -303,7 +303,7 @@ def _hidden_row(finding: Finding, base: str) -> PreviewRow:
         number=_SEVERITY_SIGNS[finding.severity],
         note=spoken(shorten(finding.message, base)),
         document=document,
-        objects=tuple(place.obj for place in finding.where if place.standing == Standing.NOT_COUNTED),
+        objects=tuple(place.obj for place in finding.where if place.standing == HiddenStanding.NOT_COUNTED),
         children=children,
     )
 
