@@ -237,15 +237,15 @@ class Notes:
             (
                 not_counted,
                 HiddenStanding.NOT_COUNTED,
-                counted_message(len(not_counted), "{n} body does not", "{n} bodies do not"),
+                counted_message(len(not_counted), "{n} body does not count", "{n} bodies do not count"),
             ),
             (
                 references,
                 HiddenStanding.REFERENCE,
                 counted_message(
                     len(references),
-                    "{n} link is only a reference and does not",
-                    "{n} links are only references and do not",
+                    "{n} link is only a reference",
+                    "{n} links are only references",
                 ),
             ),
         )
