@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from silo.bom.message import message
 from silo.inertia.assembly import Assembly
 from silo.inertia.bom.table import BomTable
 from silo.inertia.codes import MassCode
@@ -41,14 +42,15 @@ def check_links_of_urdf(report: InertiaReport, urdf: Urdf) -> None:
 
 def check_other_links(report: InertiaReport, urdf: Urdf) -> None:
     """Warn of links that are not ours, and that no simulator loads: the whole robot fails with them."""
-    sentences = [
-        f"The link {name} is not ours, and {words}."
-        for name, words in urdf.impossible.items()
-        if name not in report.links or report.links[name].props.mass <= 0
-    ]
-    if sentences:
-        words = f"{' '.join(sentences)} They stay as the URDF has them, and simulators refuse the whole file"
-        report.add_warning("", "", words, MassCode.URDF_IMPOSSIBLE)
+    for name, words in urdf.impossible.items():
+        if name not in report.links or report.links[name].props.mass <= 0:
+            sentence = message(
+                "The link {name} is not ours, and {problem}; it stays as the URDF has it, and simulators "
+                "refuse the whole file",
+                name=name,
+                problem=words,
+            )
+            report.add_warning("", "", sentence, MassCode.URDF_IMPOSSIBLE)
 
 
 def check_frames(report: InertiaReport, claims: Claims, task: Task) -> None:

@@ -13,16 +13,20 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 from xml.parsers import expat
 
 import numpy as np
 
 from silo.bom.errors import InputError
+from silo.bom.message import message
 from silo.inertia.arrays import Floats
 from silo.inertia.links.claims import ROOT_LINK
 from silo.inertia.links.frames import MOST_RAD, origin_frame
 from silo.inertia.rigid import MassProps, tensor_words
+
+MOVING = ("revolute", "continuous", "prismatic")
+"""Kinds of joints that have one position."""
 
 MAX_BYTES = 64 * 1024 * 1024
 
@@ -74,6 +78,10 @@ class _Joint:
     child: str = ""
     xyz: str = "0 0 0"
     rpy: str = "0 0 0"
+    name: str = ""
+    kind: str = ""
+    axis: str = "1 0 0"
+    mimic: tuple[str, float, float] | None = None
 
 
 @dataclass(eq=False)
@@ -83,6 +91,9 @@ class UrdfText:
     Raises InputError if ``data`` is no URDF that can be read (also for DOCTYPE: not needed in a URDF, and
     a way to attack its reader), and for two links of one name or two inertials in one link: it is unknown
     which one counts.
+
+    pose
+        joint → position [rad or m] in which the geometry was exported; 0 for the others.
     """
 
     data: bytes
@@ -94,6 +105,7 @@ class UrdfText:
     _joint: _Joint | None = None
     _inertial_at: int = -1
     robot: str = ""
+    pose: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.data[:2] in (b"\xff\xfe", b"\xfe\xff"):
@@ -142,7 +154,7 @@ class UrdfText:
     @cached_property
     def frames(self) -> dict[str, Floats]:
         """Return link → placement (4, 4) [m] of its frame in the root link's frame, with the joints at
-        position zero.
+        their positions in :attr:`pose`, zero if they have none there.
 
         It is empty if there is a :attr:`problem`.
         """
@@ -186,6 +198,20 @@ class UrdfText:
         return roots[0] if len(roots) == 1 and ROOT_LINK not in self.names else ROOT_LINK
 
     @cached_property
+    def fused_base(self) -> tuple[str, ...]:
+        """Return the root and all links that are fixed to it: MuJoCo makes them part of its world."""
+        fixed = {joint.child for joint in self._joints if joint.kind == "fixed"}
+        if self.problem:
+            return ()
+        below = {joint.child for joint in self._joints}
+        return tuple(
+            name
+            for name in self.names
+            if all(joint.child in fixed for joint in self._way_up(name))
+            and (name in fixed or name not in below)
+        )
+
+    @cached_property
     def loose(self) -> frozenset[str]:
         """Return the links that no joints connect to the root; the places of their frames are unknown."""
         if self.problem:
@@ -223,8 +249,63 @@ class UrdfText:
                     f"xyz=“{joint.xyz}” rpy=“{joint.rpy}”, wanted three numbers each; "
                     "a xacro file must be expanded first"
                 )
-            matrix = origin_frame(xyz, rpy) @ matrix
+            matrix = origin_frame(xyz, rpy) @ self._moved(joint) @ matrix
         return matrix
+
+    def _moved(self, joint: _Joint) -> Floats:
+        """Return (4, 4) of a joint's own motion at its position in :attr:`pose`."""
+        position = self._position(joint)
+        matrix: Floats = np.eye(4)
+        if not position or joint.kind not in MOVING:
+            return matrix
+        axis = np.array(_numbers(joint.axis))
+        length = float(np.linalg.norm(axis)) if axis.shape == (3,) else 0.0
+        if not np.isfinite(length) or length == 0:
+            words = f"the joint {joint.name} has the axis “{joint.axis}”, wanted three numbers"
+            raise InputError(f"{self.source}: {words}")
+        axis = axis / length
+        if joint.kind == "prismatic":
+            matrix[:3, 3] = axis * position
+            return matrix
+        x, y, z = axis.tolist()
+        cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        # Rodrigues' rotation.
+        matrix[:3, :3] += math.sin(position) * cross + (1 - math.cos(position)) * cross @ cross
+        return matrix
+
+    def _position(self, joint: _Joint) -> float:
+        if joint.name in self.pose or joint.mimic is None:
+            return self.pose.get(joint.name, 0.0)
+        leader, multiplier, offset = joint.mimic
+        return multiplier * self.pose.get(leader, 0.0) + (offset if leader in self.pose else 0.0)
+
+    def at(self, pose: Mapping[str, float]) -> Self:
+        """Return the same URDF with its joints at these positions [rad or m].
+
+        Raises InputError for a joint that it does not have, or that does not move.
+        """
+        kinds = {joint.name: joint.kind for joint in self._joints}
+        for name in pose:
+            if name not in kinds:
+                joints = ", ".join(kinds) or "none"
+                raise InputError(
+                    message(
+                        "{source}: there is no joint {name}; it has {joints}",
+                        source=self.source,
+                        name=name,
+                        joints=joints,
+                    )
+                )
+            if kinds[name] not in MOVING:
+                raise InputError(
+                    message(
+                        "{source}: the joint {name} is {kind}, and has no position",
+                        source=self.source,
+                        name=name,
+                        kind=kinds[name] or "?",
+                    )
+                )
+        return type(self)(self.data, self.source, pose=pose)
 
     def _doctype(self, *_: Any) -> None:
         raise InputError(f"{self.source}: has a DOCTYPE, which a URDF does not need and which is not read")
@@ -246,7 +327,7 @@ class UrdfText:
             end, closed = self._tag_end(here)
             self._open = LinkSpan(attributes["name"], here, end, closed)
         elif tag == "joint" and "gazebo" not in self._stack:
-            self._joint = _Joint()
+            self._joint = _Joint(name=attributes.get("name", ""), kind=attributes.get("type", ""))
         elif self._open is not None and tag == "mesh" and "filename" in attributes:
             self._open.meshes.append(attributes["filename"])
         elif self._joint is not None and above == "joint":
@@ -274,6 +355,14 @@ class UrdfText:
         elif tag == "origin":
             joint.xyz = attributes.get("xyz", joint.xyz)
             joint.rpy = attributes.get("rpy", joint.rpy)
+        elif tag == "axis":
+            joint.axis = attributes.get("xyz", joint.axis)
+        elif tag == "mimic":
+            multiplier, offset = (
+                (_numbers(attributes.get(key, usual)) or [math.nan])[0]
+                for key, usual in (("multiplier", "1"), ("offset", "0"))
+            )
+            joint.mimic = attributes.get("joint", ""), multiplier, offset
 
     def _end(self, parser: expat.XMLParserType, tag: str) -> None:
         here = parser.CurrentByteIndex

@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 import trimesh
 
-from silo.bom.errors import DocumentError
+from silo.bom.errors import DocumentError, InputError
 from silo.cli.main import main
 from silo.inertia import compute_link_inertials, geometry
 from silo.inertia.assembly import Assembly
 from silo.inertia.geometry.options import ReadOptions
 from silo.inertia.geometry.robot import found_mesh
 from silo.inertia.notes import GeometryCode
+from silo.inertia.urdf import read_urdf
 
 JOINT = """<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/><origin xyz="{3}"
     rpy="{4}"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>"""
@@ -196,12 +197,101 @@ def test_links_that_no_body_can_be_are_named(tmp_path: Path, capsys: pytest.Capt
         body += JOINT.format(child, "base", child, "0 0 0", "0 0 0")
     main(["inertia", str(_robot(tmp_path, body)), "--json", "--no-cache"])
     warnings = json.loads(capsys.readouterr().out)["warnings"]
-    (message,) = (w["message"] for w in warnings if w["code"] == "urdf_impossible")
-    assert "The link hip is not ours, and its inertia tensor has a principal moment" in message
-    assert "The link thin is not ours, and its inertia tensor has a principal moment above the sum" in message
-    assert "The link nan is not ours, and its mass or a moment of inertia is no finite number." in message
-    assert "The link less is not ours, and its mass is negative (-1 kg)." in message
-    assert "good" not in message
+    found = [w["message"] for w in warnings if w["code"] == "urdf_impossible"]
+    beginnings = (
+        "The link hip is not ours, and its inertia tensor has a principal moment",
+        "The link thin is not ours, and its inertia tensor has a principal moment above the sum",
+        "The link nan is not ours, and its mass or a moment of inertia is no finite number;",
+        "The link less is not ours, and its mass is negative (-1 kg);",
+    )
+    assert len(found) == len(beginnings)  # one sentence each, and none about the good one
+    for sentence, beginning in zip(found, beginnings, strict=True):
+        assert sentence.startswith(beginning)
+
+
+MOVING = """<link name="a"/><link name="b"/><link name="c"/><link name="d"/><link name="e"/>
+<joint name="ab" type="revolute"><parent link="a"/><child link="b"/><origin xyz="1 0 0.2" rpy="0.1 0.2 0.3"/>
+  <axis xyz="0 2 2"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+<joint name="bc" type="prismatic"><parent link="b"/><child link="c"/><origin xyz="0 0.5 0" rpy="0 0 1"/>
+  <axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+<joint name="cd" type="continuous"><parent link="c"/><child link="d"/><origin xyz="0.3 0 0"/></joint>
+<joint name="de" type="fixed"><parent link="d"/><child link="e"/><origin xyz="0 0 0.4"/></joint>"""
+
+
+def test_joints_stand_where_they_were_exported(tmp_path: Path) -> None:
+    """The frames of all links at a pose are those of a simulator at that pose."""
+    mujoco = pytest.importorskip("mujoco")
+    inertial = (
+        '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
+    )
+    text = MOVING
+    for name in "abcde":
+        text = text.replace(f'<link name="{name}"/>', f'<link name="{name}">{inertial}</link>')
+    path = _robot(tmp_path, '<mujoco><compiler fusestatic="false"/></mujoco>' + text)
+    pose = {"ab": 0.52, "bc": -0.25, "cd": 2.2}
+    frames = read_urdf(path).at(pose).frames
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    for joint, position in pose.items():
+        data.joint(joint).qpos = position
+    mujoco.mj_forward(model, data)
+    for name in "bcde":
+        assert frames[name][:3, 3] == pytest.approx(data.body(name).xpos, abs=1e-9)
+        assert frames[name][:3, :3].ravel() == pytest.approx(data.body(name).xmat, abs=1e-9)
+
+
+def test_a_joint_that_follows_another_follows_it(tmp_path: Path) -> None:
+    body = MOVING.replace(
+        '<axis xyz="0 0 1"/>', '<axis xyz="0 0 1"/><mimic joint="ab" multiplier="0.5" offset="0.1"/>'
+    )
+    urdf = read_urdf(_robot(tmp_path, body))
+    assert urdf.at({"ab": 0.4}).frames["c"] == pytest.approx(urdf.at({"ab": 0.4, "bc": 0.3}).frames["c"])
+
+
+@pytest.mark.parametrize(
+    ("pose", "words"),
+    [
+        ({"elbow": 1.0}, "there is no joint elbow; it has ab, bc, cd, de"),
+        ({"de": 1.0}, "the joint de is fixed"),
+    ],
+)
+def test_a_joint_that_is_not_there_is_refused(pose: dict[str, float], words: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=words):
+        read_urdf(_robot(tmp_path, MOVING)).at(pose)
+
+
+def test_the_links_that_mujoco_makes_part_of_its_world(tmp_path: Path) -> None:
+    body = MOVING.replace('name="ab" type="revolute"', 'name="ab" type="fixed"')
+    assert read_urdf(_robot(tmp_path, body)).fused_base == ("a", "b")
+
+
+def test_a_step_file_in_another_pose_is_weighed_in_the_frames_of_its_links(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The same arm, exported straight and bent, gives the same inertia of its links."""
+    results = []
+    for angle in (0.0, 0.9):
+        scene = trimesh.Scene()
+        bent = trimesh.transformations.rotation_matrix(angle, [0, 0, 1], [0.3, 0, 0])
+        for name, offset, place in (("upper", 0.15, np.eye(4)), ("lower", 0.4, bent)):
+            arm = trimesh.creation.box((0.2, 0.04, 0.02))
+            arm.apply_translation((offset, 0, 0))
+            scene.add_geometry(arm, node_name=name, geom_name=name, transform=place)
+        mesh = tmp_path / f"arm{angle:g}.glb"
+        mesh.write_bytes(scene.export(file_type="glb"))
+        body = '<link name="upper"/><link name="lower"/>' + JOINT.format(
+            "elbow", "upper", "lower", "0.3 0 0", "0 0 0"
+        )
+        urdf = _robot(tmp_path, body, f"arm{angle:g}.urdf")
+        links = tmp_path / "map.yaml"
+        links.write_text("links:\n  upper: {parts: [upper]}\n  lower: {parts: [lower]}\n", "utf-8")
+        arguments = ["inertia", str(mesh), "--urdf", str(urdf), "--links", str(links), "--json", "--no-cache"]
+        main([*arguments, *(["--joint", f"elbow={angle}"] if angle else [])])
+        found = json.loads(capsys.readouterr().out)["links"]
+        results.append({link["name"]: (link["com"], link["inertia"]) for link in found})
+    for name in ("upper", "lower"):
+        for straight, turned in zip(results[0][name], results[1][name], strict=True):
+            assert np.array(turned) == pytest.approx(np.array(straight), abs=1e-6)
 
 
 def test_a_robot_without_shapes_is_refused_in_words(tmp_path: Path) -> None:

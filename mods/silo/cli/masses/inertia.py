@@ -4,11 +4,14 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from silo import spoken
 from silo.bom.errors import InputError, listed
+from silo.bom.message import message
 from silo.cli.masses.geometry import read_model
 from silo.cli.masses.options import (
     add_bom_options,
@@ -73,6 +76,10 @@ def add_inertia(parser: argparse.ArgumentParser) -> None:
         group,
         {
             "--urdf FILE": "take names and frames of the links from this URDF, to fill it",
+            "--joint NAME=POSITION...": (
+                "the position of a joint of the URDF [rad or m] in which the geometry was exported, for "
+                "example elbow=0.52; 0 for the others; may be repeated"
+            ),
             "--in-place": "write the <inertial> into the --urdf itself",
         },
     )
@@ -132,7 +139,6 @@ def _task(args: argparse.Namespace) -> Task:
     from silo.inertia.links.link_map import read_link_map
     from silo.inertia.masses import Options
     from silo.inertia.task import Task
-    from silo.inertia.urdf import read_urdf
 
     frame = FrameChoice(args.frame or ("urdf" if args.urdf else "assembly"))
     if frame is FrameChoice.URDF and not args.urdf:
@@ -142,10 +148,35 @@ def _task(args: argparse.Namespace) -> Task:
         Options(args.default_density, args.density_from_step),
         read_link_map(args.links) if args.links else None,
         frame,
-        read_urdf(args.urdf) if args.urdf else None,
+        _urdf(args),
         args.loose,
         weights=named_values(args.mass, "--mass", "NAME=MASS, for example arm=1.25kg"),
     )
+
+
+def _urdf(args: argparse.Namespace) -> Urdf | None:
+    from silo.inertia.urdf import read_urdf
+
+    pose = {}
+    for name, text in named_values(args.joint, "--joint", "NAME=POSITION, for example elbow=0.52").items():
+        try:
+            pose[name] = float(text)
+        except ValueError:
+            pose[name] = math.nan
+        if not math.isfinite(pose[name]):
+            raise InputError(
+                message("--joint {name}: wanted a position in rad or m, got “{text}”", name=name, text=text)
+            )
+    if not args.urdf:
+        if pose:
+            raise InputError(message("--joint needs --urdf FILE, whose joints it moves"))
+        return None
+    urdf = read_urdf(args.urdf)
+    if pose and urdf.source == args.assembly:
+        raise InputError(
+            message("--joint is for geometry beside a URDF; the meshes of a URDF move with its links")
+        )
+    return urdf.at(pose) if pose else urdf
 
 
 def is_urdf(path: str) -> bool:
@@ -171,6 +202,13 @@ def _write_urdf(args: argparse.Namespace, report: InertiaReport, urdf: Urdf) -> 
         print(f"{args.urdf}: not written; --urdf-out FILE or --in-place says where to", file=sys.stderr)
         return
     print(f"{target}: wrote the inertia of {listed(filled.written, 8)}.", file=sys.stderr)
+    if (fused := urdf.fused_base) and set(fused) & set(filled.written):
+        note = message(
+            "To compare: MuJoCo merges {links} into its static world and shows no mass of them, unless the "
+            'URDF says <mujoco><compiler fusestatic="false"/></mujoco>.',
+            links=listed(fused, 8),
+        )
+        print(spoken(note), file=sys.stderr)
     left = [name for name in filled.untouched if name not in report.links]
     if left:
         print(f"{target}: left as they were, no link of ours: {listed(left, 8)}.", file=sys.stderr)
