@@ -5,8 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from decimal import Decimal
+from math import isfinite
 from typing import Any, NamedTuple
 
+from silo.bom.quantities import quantity_of
 from silo.bom.units import line_unit
 from silo.file_kind import MODEL
 
@@ -135,7 +138,7 @@ class LineState:
         why a user keeps it as an intentional, non-CAD line.
     """
 
-    quantity: float
+    quantity: Decimal
     source: str
     rel_type: str = "component"
     unit: str | None = None
@@ -145,9 +148,16 @@ class LineState:
     child_revision: int | None = None
     unreferenced_since: str | None = None
     override: bool = False
-    cad_quantity: float | None = None
+    cad_quantity: Decimal | None = None
     reason: str | None = None
     metadata: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Keep quantities as they were typed; what is no number stays, for the check of the state to name."""
+        for name in ("quantity", "cad_quantity"):
+            value = getattr(self, name)
+            if isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value):
+                object.__setattr__(self, name, quantity_of(value))
 
 
 class Line(NamedTuple):

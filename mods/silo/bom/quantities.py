@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from decimal import Context, Decimal
+from decimal import Context, Decimal, InvalidOperation
 from functools import reduce
 from math import isclose, isfinite
 from typing import overload
@@ -26,6 +26,37 @@ def as_decimal(value: float | int | Decimal) -> Decimal:
             raise ValueError(message("wanted a finite number, got {value}", value=value))
         return Decimal(repr(value))
     return Decimal(value)
+
+
+# A double holds fifteen digits of any number. Digits behind them are of arithmetic, unless they were typed.
+_DOUBLE, _TYPED = Context(prec=15), 12
+
+
+def quantity_of(value: float | int | Decimal | str) -> Decimal:
+    """Return a quantity exactly as it was typed, without the dust of binary arithmetic.
+
+    0.1 is one tenth, and 0.1 + 0.2 of a program is 0.3. A double with more digits than arithmetic leaves
+    behind keeps all of them. ValueError for what is no finite number.
+    """
+    if isinstance(value, str):
+        try:
+            exact = Decimal(value)
+        except InvalidOperation:
+            raise ValueError(f"wanted a number, got {value[:40]!r}") from None
+        if not exact.is_finite():
+            raise ValueError(f"wanted a finite number, got {value[:40]}")
+        return exact
+    exact = as_decimal(value)
+    if not isinstance(value, float):
+        return exact
+    short = _DOUBLE.plus(exact).normalize()
+    return short if len(short.as_tuple().digits) <= _TYPED else exact
+
+
+def decimal_text(value: Decimal) -> str:
+    """Write a decimal in its one form: no exponent, no zeros at the end."""
+    text = f"{value:f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def exact_sum(values: Iterable[float | int | Decimal]) -> Decimal:

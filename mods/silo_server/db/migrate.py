@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Callable, Sequence
+from decimal import Decimal
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
@@ -29,6 +30,7 @@ from sqlalchemy import (
     Table,
     Text,
     UniqueConstraint,
+    and_,
     false,
     func,
     literal,
@@ -36,6 +38,7 @@ from sqlalchemy import (
 )
 
 from silo.bom.errors import ConfigError, listed
+from silo.bom.quantities import decimal_text, quantity_of
 from silo.bom.units import known_unit, stored_unit
 from silo.file_kind import MODEL, kind_by_name, kind_of
 from silo_server.db.database import Database
@@ -866,6 +869,38 @@ def _graded_costs(op: Operations) -> None:
     op.execute("DELETE FROM product_summaries")
 
 
+def _exact_quantities(op: Operations) -> None:
+    """Keep quantities as decimals in text, as prices are. What arithmetic left behind in them is rounded.
+
+    0.30000000000000004 becomes 0.3, and is listed.
+    """
+    bind, left = op.get_bind(), op.get_context().opts.get(LEFT, [])
+    items = Table("items", MetaData(), autoload_with=bind)
+    numbers = dict(bind.execute(select(items.c.id, items.c.part_number)).all())
+    for name, keys, columns in (
+        ("bom_lines", ("id",), ("quantity", "cad_quantity")),
+        ("bom_conflicts", ("parent_id", "child_id"), ("cad_quantity",)),
+    ):
+        old = Table(name, MetaData(), autoload_with=bind)
+        before = bind.execute(select(old)).mappings().all()
+        with op.batch_alter_table(name) as table:
+            for column in columns:
+                table.alter_column(column, existing_type=Float(53), type_=String(48))
+        made = Table(name, MetaData(), autoload_with=bind)
+        for row in before:
+            texts = {
+                column: decimal_text(quantity_of(float(row[column])))
+                for column in columns
+                if row[column] is not None
+            }
+            this = and_(*(made.c[key] == row[key] for key in keys))
+            bind.execute(made.update().where(this).values(texts))
+            for column, text in texts.items():
+                if Decimal(text) != Decimal(repr(float(row[column]))):
+                    parent, child = numbers.get(row["parent_id"]), numbers.get(row["child_id"])
+                    left.append(f"{column} of {child} in {parent}: {row[column]!r} was rounded to {text}")
+
+
 STEPS: dict[str, Callable[[Operations], None]] = {
     "0007": _first_schema,
     "0008": _answers,
@@ -884,4 +919,5 @@ STEPS: dict[str, Callable[[Operations], None]] = {
     "0022": _credentials,
     "0023": _held_boms,
     "0024": _graded_costs,
+    "0025": _exact_quantities,
 }

@@ -13,13 +13,14 @@ Rules of this module:
 
 from __future__ import annotations
 
+from decimal import Decimal
 from typing import Any
 
 from sqlalchemy import (
     BigInteger,
     Boolean,
     Column,
-    Float,
+    Dialect,
     ForeignKey,
     Index,
     Integer,
@@ -27,10 +28,13 @@ from sqlalchemy import (
     String,
     Table,
     Text,
+    TypeDecorator,
     UniqueConstraint,
     false,
     text,
 )
+
+from silo.bom.quantities import decimal_text, quantity_of
 
 NAMES = {
     "ix": "ix_%(table_name)s_%(column_0_N_name)s",
@@ -46,6 +50,22 @@ Stamp = String(32)
 # By code point on both databases, whatever language a PostgreSQL sorts in by itself.
 Key = String(64).with_variant(String(64, collation="C"), "postgresql")
 Uuid = String(36)
+
+
+class Amount(TypeDecorator[Decimal]):
+    """A quantity: a decimal, kept as its one text, as prices are. Binary numbers would not keep 0.1."""
+
+    impl = String(48)
+    cache_ok = True
+
+    def process_bind_param(self, value: Any, dialect: Dialect) -> str | None:
+        """Write a quantity."""
+        return None if value is None else decimal_text(quantity_of(value))
+
+    def process_result_value(self, value: Any, dialect: Dialect) -> Decimal | None:
+        """Read a quantity."""
+        return None if value is None else Decimal(value)
+
 
 # What waits for a decision, for indexes that hold little else; a query must say it in these words.
 UNREFERENCED = "unreferenced_since IS NOT NULL"
@@ -205,7 +225,7 @@ bom_lines = Table(
     needed("child_id", Id, ForeignKey("items.id")),
     needed("position", Integer),
     needed("rel_type", String(16)),
-    needed("quantity", Float(53)),
+    needed("quantity", Amount),
     Column("unit", String(32)),
     needed("reference_designators", Text),
     Column("find_number", String(32)),
@@ -214,7 +234,7 @@ bom_lines = Table(
     needed("source", String(16)),
     Column("unreferenced_since", Stamp),
     needed("override", Boolean),
-    Column("cad_quantity", Float(53)),
+    Column("cad_quantity", Amount),
     Column("reason", Text),
     needed("metadata", Text),
     UniqueConstraint("parent_id", "child_id", "rel_type"),
@@ -274,7 +294,7 @@ bom_conflicts = Table(
     metadata,
     primary("parent_id", Id, ForeignKey("items.id")),
     primary("child_id", Id, ForeignKey("items.id")),
-    needed("cad_quantity", Float(53)),
+    needed("cad_quantity", Amount),
     needed("since", Stamp),
     needed("accepted", Boolean),
 )

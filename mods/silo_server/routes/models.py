@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from decimal import Decimal
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 from pydantic import (
     AfterValidator,
@@ -18,7 +19,7 @@ from pydantic import (
 
 from silo.api import wire
 from silo.bom.numbers import read_quantity
-from silo.bom.quantities import LARGEST_QUANTITY
+from silo.bom.quantities import LARGEST_QUANTITY, quantity_of
 from silo.bom.text import character_problem
 from silo_server.routes import openapi
 from silo_server.schema import text_hints
@@ -59,11 +60,11 @@ def _amount(value: object) -> object:
         reading = read_quantity(value, points_are_decimal=True)
         if reading.value is None:
             raise ValueError(reading.problem)
-        return float(reading.value)
+        value = reading.value
     problem = quantity_problem(value)
     if problem is not None:
         raise ValueError(problem)
-    return value
+    return quantity_of(cast(float | int | Decimal, value))
 
 
 def _whole(value: object) -> object:
@@ -78,7 +79,7 @@ ChangeId = Annotated[int, Field(strict=True, ge=1, le=2**53 - 1), _WHOLE]
 ChangeIdOrNone = Annotated[int, Field(strict=True, ge=0, le=2**53 - 1), _WHOLE]
 # A quantity: a number, or text as people type it.
 Amount = Annotated[
-    float,
+    Decimal,
     BeforeValidator(_amount),
     WithJsonSchema(
         {
@@ -276,7 +277,7 @@ class NewLineBody(_LineTexts):
     """``POST /api/items/{pn}/bom``."""
 
     child_part_number: Short
-    quantity: Amount = 1
+    quantity: Amount = Decimal(1)
     rel_type: RelType = "component"
     reference_designators: list[Short] = Field(default_factory=list, max_length=10_000)
     child_revision: RevisionNumber | None = None
@@ -299,7 +300,7 @@ class LineChangeBody(_LineTexts):
     A quantity, a relation type and a source cannot be cleared: null is refused for them.
     """
 
-    quantity: Amount = _kept(1)
+    quantity: Amount = _kept(Decimal(1))
     rel_type: RelType = _kept("component")
     reference_designators: list[Short] | None = Field(None, max_length=10_000)
     child_revision: RevisionNumber | None = None

@@ -15,7 +15,7 @@ from starlette.responses import Response
 
 from silo.bom.errors import RejectedError
 from silo.bom.numbers import LONGEST, read_number
-from silo.bom.quantities import as_decimal
+from silo.bom.quantities import as_decimal, decimal_text
 from silo.tables.price_rows import PriceRows
 from silo.tables.sheet import Layout
 from silo_server.db.transaction import Tx
@@ -33,7 +33,6 @@ from silo_server.services.items import get_item
 from silo_server.services.orders import NewOrder, OrderRequest, OrderRow, Recorded
 from silo_server.services.product.export import Export
 from silo_server.services.product.export_files import to_csv, to_xlsx
-from silo_server.services.suppliers import decimal_text
 
 router = APIRouter(
     route_class=BoundedRoute,

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 import re
+from decimal import Decimal
 from typing import Any
 
 from silo.bom.errors import RejectedError
-from silo.bom.quantities import LARGEST_QUANTITY
+from silo.bom.quantities import LARGEST_QUANTITY, quantity_of
 from silo.bom.text import character_problem
 
 
@@ -34,15 +35,18 @@ def sha256_or_none(name: str, value: Any) -> str | None:
 
 def quantity_problem(value: Any) -> str | None:
     """Say what is wrong with a quantity; None if nothing is."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    if isinstance(value, bool) or not isinstance(value, int | float | Decimal):
         return f"wanted a number, got {shortened(value)}"
     # A huge integer has no float; comparing it is safe, converting it is not.
     if not 0 < value <= LARGEST_QUANTITY or not math.isfinite(value):
         return f"wanted a number above 0 and at most 1e9, got {shortened(value)}"
+    # It travels as a JSON number, which most readers take for a double.
+    if isinstance(value, Decimal) and quantity_of(float(value)) != value:
+        return f"wanted a number of at most 15 digits, got {value:f}"
     return None
 
 
 def shortened(value: Any) -> str:
     """Write a value of a request for a message, in at most 60 characters."""
-    text = repr(value)
+    text = f"{value:f}" if isinstance(value, Decimal) else repr(value)
     return text if len(text) <= 60 else text[:57] + "…"

@@ -20,7 +20,7 @@ from typing import NamedTuple
 from sqlalchemy import false, insert, or_, select, update
 
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError, counted, listed
-from silo.bom.quantities import exact_product, exact_sum, plain
+from silo.bom.quantities import decimal_text, exact_product, exact_sum, plain
 from silo.bom.units import converted, unit_of
 from silo.file_kind import ATTACHMENT_KINDS, MODEL
 from silo_server.db.rows import one_of
@@ -39,7 +39,7 @@ from silo_server.services.product.parts import RolledItem, parts_of, positive_nu
 from silo_server.services.product.summary import Summary
 from silo_server.services.product.summary_read import summary_of
 from silo_server.services.releases import Release, get_release, newest_release
-from silo_server.services.suppliers import SupplierOffer, decimal_text, rates_of
+from silo_server.services.suppliers import SupplierOffer, rates_of
 from silo_server.times import wire_time
 from silo_server.values import Item
 

@@ -25,7 +25,7 @@ from sqlalchemy import func, insert, select, update
 from silo.bom.errors import ConflictError, InputError, RejectedError, VersionConflictError
 from silo.bom.headers import Heading
 from silo.bom.numbers import Mark, parse_number, read_number, whole_number, yes_or_no
-from silo.bom.quantities import as_decimal, exact_product
+from silo.bom.quantities import as_decimal, decimal_text, exact_product
 from silo.bom.text import character_problem
 from silo.tables.price_rows import PRICES, PriceRow, PriceRows, price_rows
 from silo.tables.sheet import Layout
@@ -207,12 +207,6 @@ def from_json(made: Mapping[str, Any]) -> SupplierPart:
     prices = tuple((Decimal(price["quantity"]), Decimal(price["price"])) for price in made["prices"])
     sizes = {name: Decimal(made[name]) for name in ("pack_size", "minimum")}
     return SupplierPart(**{**made, **sizes, "prices": prices})
-
-
-def decimal_text(value: Decimal) -> str:
-    """Write a decimal in its one form: no exponent, no zeros at the end."""
-    text = f"{value:f}"
-    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def typed_text(value: Decimal) -> str:

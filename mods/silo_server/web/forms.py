@@ -7,6 +7,7 @@ import json
 import secrets
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import Annotated
 from urllib.parse import quote, unquote, urlsplit
 
@@ -103,14 +104,14 @@ class AmbiguousError(RejectedError):
         self.readings = tuple(readings)
 
 
-def amount(typed: str, name: str = "quantity") -> float:
+def amount(typed: str, name: str = "quantity") -> Decimal:
     """Read a quantity as people type it (``silo.bom.numbers``); RejectedError says what is wrong.
 
     Raises AmbiguousError for "1,000": the person is asked which of the two numbers was meant.
     """
     reading = read_quantity(typed)
     if reading.value is not None:
-        return float(reading.value)
+        return reading.value
     number = parse_number(typed)
     if number is not None and number.other is not None:
         readings = [str(plain(number.other)), str(plain(number.exact))]

@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from decimal import Decimal
 from typing import Any
 
 from starlette.datastructures import FormData
@@ -230,7 +231,7 @@ def _quantity_by(story: Sequence[tuple[Change, ChangedLine]]) -> Change | None:
 
 
 def _cad_words(
-    line: Line, quantities: Mapping[int, float], by_hand: Change | None, merge: Change | None
+    line: Line, quantities: Mapping[int, Decimal], by_hand: Change | None, merge: Change | None
 ) -> str:
     """Describe CAD's quantity for a line that a user changed; the conflict above it says the same."""
     if line.child_id in quantities:
@@ -245,7 +246,7 @@ def _cad_words(
     return _("CAD said %(quantity)s before", quantity=of_cad(line.state.cad_quantity, line.unit))
 
 
-def of_cad(count: float | None, unit: str | None) -> str:
+def of_cad(count: Decimal | None, unit: str | None) -> str:
     """Write a quantity of CAD beside a line with this unit: ``6``, or ``6 pieces`` beside ``0.5 m``."""
     return quantity(count, unit if counts_pieces(unit) else _("piece") if count == 1 else _("pieces"))
 

@@ -15,6 +15,7 @@ from starlette.datastructures import FormData
 from starlette.responses import Response
 
 from silo.bom.errors import NotFoundError, RejectedError, SiloError, VersionConflictError
+from silo.bom.quantities import decimal_text
 from silo.tables.price_rows import PRICES, PriceRows
 from silo.tables.sheet import Layout
 from silo_server.routes.call import Call
@@ -23,7 +24,7 @@ from silo_server.services import items as item_service
 from silo_server.services import orders, releases, suppliers
 from silo_server.services.items import ItemChange, get_item
 from silo_server.services.orders import OrderRequest, OrderRow
-from silo_server.services.suppliers import COLUMNS, EXAMPLES, MOST_PARTS, decimal_text, typed_text
+from silo_server.services.suppliers import COLUMNS, EXAMPLES, MOST_PARTS, typed_text
 from silo_server.web.accounts import Administrator, Reader, Writer
 from silo_server.web.attachments import kind_words
 from silo_server.web.forms import Form, amount, back, back_to, problems_of, text, texts, whole

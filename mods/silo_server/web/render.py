@@ -37,7 +37,7 @@ from starlette.responses import HTMLResponse, Response
 
 import silo
 from silo.bom.numbers import whole_number
-from silo.bom.quantities import as_decimal
+from silo.bom.quantities import as_decimal, decimal_text, quantity_of
 from silo_server.actors import Actor, Role
 from silo_server.db.state import mode_of
 from silo_server.routes.call import Call, server_of
@@ -241,12 +241,17 @@ def N_(text: str) -> str:
 SWITCHED_OFF = ' disabled aria-describedby="closed" title="{}"'
 
 
-def quantity(value: float | None, unit: str | None = None) -> str:
+def quantity(value: float | Decimal | None, unit: str | None = None) -> str:
     """Write a quantity: ``12``, ``2.5 m``; a dash if there is none."""
     if value is None:
         return "–"
-    shown = str(int(value)) if value == int(value) and abs(value) < 1e15 else f"{value:.12g}"
+    shown = in_reader_form(decimal_text(quantity_of(value)))
     return f"{shown} {isolate(unit)}" if unit else shown
+
+
+def in_reader_form(number: str) -> str:
+    """Write a number with the decimal mark of the page's language."""
+    return number if LANGUAGE.get() == "en" else number.replace(".", ",")
 
 
 @lru_cache(maxsize=4096)
@@ -312,8 +317,11 @@ def closed(text: str) -> str:
 
 
 def grouped(value: Decimal) -> str:
-    """Write ``12 345.6``: groups of three digits with a narrow space that does not break; no exponent."""
-    return f"{value:,f}".replace(",", "\u202f")
+    """Write ``12 345.6``: groups of three digits with a narrow space that does not break; no exponent.
+
+    With the decimal mark of the page's language.
+    """
+    return in_reader_form(f"{value:,f}".replace(",", "\u202f"))
 
 
 def mass(kilograms: float | Decimal | None) -> str:

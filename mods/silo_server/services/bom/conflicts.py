@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -20,7 +21,7 @@ from silo_server.values import Item, Line
 class CadQuantity(NamedTuple):
     """What CAD says of a line in conflict (0: not in CAD), and since when."""
 
-    quantity: float
+    quantity: Decimal
     since: str
 
 
@@ -71,7 +72,7 @@ class Conflict:
     """CAD and a line that a user owns differ. ``cad_quantity`` 0: the assembly no longer has it."""
 
     line: Line
-    cad_quantity: float
+    cad_quantity: Decimal
     since: str
 
 
@@ -82,7 +83,7 @@ def open_conflicts(tx: Tx, parent: Item, lines: Sequence[Line]) -> list[Conflict
     return [Conflict(line, *cad_quantity) for line, cad_quantity in said if cad_quantity is not None]
 
 
-def last_cad_quantities(tx: Tx, parent_ids: Collection[int]) -> dict[int, dict[int, float]]:
+def last_cad_quantities(tx: Tx, parent_ids: Collection[int]) -> dict[int, dict[int, Decimal]]:
     """Read the quantities that the last merge gave for lines that users own; 0: not in the assembly.
 
     Parent → child → quantity, by internal ids.
@@ -92,7 +93,7 @@ def last_cad_quantities(tx: Tx, parent_ids: Collection[int]) -> dict[int, dict[i
             one_of(tx, bom_conflicts.c.parent_id, parent_ids)
         )
     )
-    quantities: dict[int, dict[int, float]] = {}
+    quantities: dict[int, dict[int, Decimal]] = {}
     for row in rows:
         quantities.setdefault(row.parent_id, {})[row.child_id] = row.cad_quantity
     return quantities

@@ -347,7 +347,7 @@ def _as_written(line: Line, name: str, value: Any) -> bool:
 
 
 def _changes(row: BomRow, problems: list[str]) -> dict[str, Any]:
-    changes: dict[str, Any] = {} if row.quantity is None else {"quantity": float(row.quantity)}
+    changes: dict[str, Any] = {} if row.quantity is None else {"quantity": row.quantity}
     for name in LineTexts.model_fields:
         if name in row.texts:
             changes[name] = row.texts[name] or None

@@ -6,6 +6,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import replace
+from decimal import Decimal
 from functools import lru_cache
 from typing import Any
 
@@ -15,8 +16,11 @@ from silo_server.values import LineState
 
 
 def state_to_json(state: LineState) -> dict[str, Any]:
-    """Write a line's state as the history stores it: only the fields that are set."""
-    fields = ((name, getattr(state, name)) for name in names_of(LineState))
+    """Write a line's state as the history stores it: only the fields that are set.
+
+    Quantities are JSON numbers that read back exactly (:func:`silo.bom.quantities.quantity_of`).
+    """
+    fields = ((name, _json_of(getattr(state, name))) for name in names_of(LineState))
     return {
         name: value
         for name, value in fields
@@ -24,13 +28,17 @@ def state_to_json(state: LineState) -> dict[str, Any]:
     }
 
 
-def mark_of(state: LineState, cad_quantity: float | None = None) -> str:
+def _json_of(value: Any) -> Any:
+    return float(value) if isinstance(value, Decimal) else value
+
+
+def mark_of(state: LineState, cad_quantity: Decimal | None = None) -> str:
     """Make a short mark of what a user saw of a line; another state has another mark.
 
     cad_quantity
         the quantity in CAD that a conflict shows beside the line.
     """
-    seen = dumps([state_to_json(state), cad_quantity])
+    seen = dumps([state_to_json(state), _json_of(cad_quantity)])
     return hashlib.sha256(seen.encode()).hexdigest()[:16]
 
 
@@ -46,7 +54,6 @@ def stored_state(text: str) -> LineState:
 def state_columns(state: LineState) -> dict[str, Any]:
     """Write a line's state as values for the columns of the table."""
     return {name: getattr(state, name) for name in names_of(LineState)} | {
-        "quantity": float(state.quantity),
         "reference_designators": dumps(list(state.reference_designators)),
         "metadata": dumps(dict(state.metadata)),
     }

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from decimal import Decimal
 from typing import Any
 
 from sqlalchemy import delete, select
@@ -19,6 +20,7 @@ from silo.bom.compare.bom_diff import BomDiff, QuantityChange
 from silo.bom.compare.merge import MergePlan, plan_merge
 from silo.bom.compare.owner import is_manual
 from silo.bom.errors import RejectedError
+from silo.bom.quantities import plain, quantity_of
 from silo_server.db.answers import KeptAnswer, KeyedRequest, earlier_answer, keep_answer
 from silo_server.db.rows import insert_rows, one_of
 from silo_server.db.tables import bom_conflicts, items
@@ -110,7 +112,7 @@ def merge_bom(tx: Tx, part_number: str, request: MergeRequestIn, expected: int |
     item's newest file), MissingRevisionError (its file is not here).
     """
     parent = locked_parent(tx, part_number)
-    entries = [(entry.key, entry.quantity, entry.components) for entry in request.entries]
+    entries = [(entry.key, float(entry.quantity), entry.components) for entry in request.entries]
     document = (getattr(request, name) for name in names_of(MergeRequestIn) if name.startswith("document"))
     keyed = KeyedRequest.of(f"merge {parent.id}", request.sync_id, entries, request.left_out, *document)
     if earlier := earlier_answer(tx, keyed):
@@ -173,7 +175,7 @@ def _prepare(tx: Tx, parent: Item, request: MergeRequestIn) -> _Prepared:
         *plan.diff.conflicts,
         *_overrides_gone(lines, kept.union(e["child_part_number"] for e in entries)),
     ]
-    open_ones = tuple(c for c in conflicts if accepted.get(child_ids[c.part_number]) != c.local_quantity)
+    open_ones = tuple(c for c in conflicts if accepted.get(child_ids[c.part_number]) != _cad_quantity(c))
     plan = replace(plan, diff=replace(plan.diff, conflicts=open_ones))
     return _Prepared(parent, lines, child_ids, plan, accepted, conflicts, before)
 
@@ -227,7 +229,7 @@ def _overrides_gone(lines: Sequence[Line], numbers: set[str]) -> list[QuantityCh
     # A user changed a quantity of a CAD line; now the assembly no longer has it. The line is theirs, so it
     # stays, but silence would leave a part in the BOM that is not needed.
     return [
-        QuantityChange(line.child_part_number, 0.0, line.state.quantity, line.unit or "")
+        QuantityChange(line.child_part_number, 0.0, plain(line.state.quantity), line.unit or "")
         for line in lines
         if line.state.override and line.child_part_number not in numbers
     ]
@@ -240,11 +242,11 @@ def _line_changes(tx: Tx, prepared: _Prepared) -> list[LineRecord]:
             new_line_id(),
             prepared.child_ids[added.part_number],
             None,
-            LineState(float(added.quantity or 0.0), "assembly"),
+            LineState(quantity_of(added.quantity or 0), "assembly"),
         )
         for added in plan.diff.added
     ]
-    quantities = {c.part_number: c.local_quantity for c in plan.diff.quantity_changed}
+    quantities = {c.part_number: quantity_of(c.local_quantity) for c in plan.diff.quantity_changed}
     flag, unflag = set(plan.flag), set(plan.unflag)
     touched = flag | unflag | quantities.keys()
     for line in prepared.lines:
@@ -258,6 +260,10 @@ def _line_changes(tx: Tx, prepared: _Prepared) -> list[LineRecord]:
     return changes
 
 
+def _cad_quantity(conflict: QuantityChange) -> Decimal:
+    return quantity_of(conflict.local_quantity)
+
+
 def _remember_conflicts(tx: Tx, prepared: _Prepared) -> None:
     ours = bom_conflicts.c.parent_id == prepared.parent.id
     before = {row.child_id: row for row in tx.conn.execute(select(bom_conflicts).where(ours))}
@@ -266,14 +272,15 @@ def _remember_conflicts(tx: Tx, prepared: _Prepared) -> None:
     for conflict in prepared.conflicts:
         child_id = prepared.child_ids[conflict.part_number]
         row_before = before.get(child_id)
-        same = row_before is not None and row_before.cad_quantity == float(conflict.local_quantity)
+        of_cad = _cad_quantity(conflict)
+        same = row_before is not None and row_before.cad_quantity == of_cad
         rows.append(
             {
                 "parent_id": prepared.parent.id,
                 "child_id": child_id,
-                "cad_quantity": float(conflict.local_quantity),
+                "cad_quantity": of_cad,
                 "since": row_before.since if row_before is not None and same else tx.stamp,
-                "accepted": prepared.accepted.get(child_id) == conflict.local_quantity,
+                "accepted": prepared.accepted.get(child_id) == of_cad,
             }
         )
     insert_rows(tx, bom_conflicts, rows)

@@ -14,7 +14,7 @@ from typing import Any
 
 from silo.bom.errors import RejectedError
 from silo.bom.left_out import Reason
-from silo.bom.quantities import LARGEST_QUANTITY, as_decimal
+from silo.bom.quantities import LARGEST_QUANTITY, quantity_of
 from silo_server.errors import TooLargeError
 from silo_server.services.field_checks import quantity_problem, sha256_or_none, shortened, text_problem
 
@@ -25,7 +25,7 @@ class MergeRequestEntry:
 
     index: int
     part_number: str
-    quantity: float
+    quantity: Decimal
     components: Sequence[Mapping[str, str]] = ()
 
     @property
@@ -101,7 +101,7 @@ def _sums_too_large(entries: Sequence[MergeRequestEntry]) -> list[tuple[int, str
     sums: dict[str, Decimal] = {}
     problems = []
     for entry in entries:
-        sums[entry.key] = sums.get(entry.key, Decimal(0)) + as_decimal(entry.quantity)
+        sums[entry.key] = sums.get(entry.key, Decimal(0)) + entry.quantity
         if sums[entry.key] > LARGEST_QUANTITY:
             text = f"entries[{entry.index}].quantity: all entries of {entry.part_number!r} add up to over 1e9"
             problems.append((entry.index, text))
@@ -120,7 +120,7 @@ def _entry(index: int, raw: Any) -> tuple[MergeRequestEntry | None, str | None]:
         return None, missing if text is None else f"{missing}; {text}"
     # An entry with a bad quantity is still looked up, so that an unknown number is reported as well.
     components, wrong = _components(index, raw.get("components"))
-    entry = MergeRequestEntry(index, str(name).strip(), 1.0 if text else float(quantity or 0), components)
+    entry = MergeRequestEntry(index, str(name).strip(), quantity_of(1 if text else quantity or 0), components)
     return entry, "; ".join(filter(None, (text, wrong))) or None
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from decimal import Decimal
 from itertools import chain
 from typing import Any
 
@@ -35,7 +36,7 @@ class Graph:
     lines: Mapping[int, Sequence[Line]]
     conflicts: Mapping[int, CadQuantities] = field(default_factory=dict)
 
-    def cad_quantity(self, line: Line) -> float | None:
+    def cad_quantity(self, line: Line) -> Decimal | None:
         """Return CAD's quantity for a line in conflict (0: not in CAD); None if there is no conflict."""
         said = cad_quantity_of(line, self.conflicts.get(line.parent_id, {}))
         return None if said is None else said.quantity

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from decimal import Decimal
 
 from sqlalchemy import ColumnElement, func, select
 
@@ -21,7 +22,7 @@ class Usage:
     """One use of an item: in which parent, how much, how many steps up (1 = direct)."""
 
     parent: Item
-    quantity: float
+    quantity: Decimal
     unit: str | None
     rel_type: str
     source: str
