@@ -10,10 +10,12 @@ from itertools import count
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from silo.bom.quantities import decimal_text
 from silo_server.services.suppliers import (
     SupplierPart,
     choose,
     from_json,
+    numbers_of,
     texts_of,
     to_json,
 )
@@ -109,8 +111,11 @@ def test_the_choice(several: list[SupplierPart], needed: Decimal) -> None:
 def test_what_is_shown_is_read_back(part: SupplierPart) -> None:
     """Through the cells of the table, and through what is stored; money is exact."""
     assert from_json(to_json(part)) == part
-    read, problems = Reader().read(texts_of(part))
-    assert (read, problems) == (part, [])
+    for write in (decimal_text, lambda value: decimal_text(value).replace(".", ",")):
+        texts = texts_of(part, write)
+        assert not [text for text in texts["prices"].replace(":", ";").split("; ") if text.endswith(".0")]
+        read, problems = Reader(known=numbers_of([part], write)).read(texts)
+        assert (read, problems) == (part, [])
 
 
 @given(st.text(max_size=30), st.text(max_size=30), st.text(max_size=30))

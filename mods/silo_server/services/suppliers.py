@@ -13,7 +13,7 @@ from __future__ import annotations
 import json
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import ROUND_CEILING, Decimal
 from fractions import Fraction
@@ -24,7 +24,7 @@ from sqlalchemy import func, insert, select, update
 
 from silo.bom.errors import ConflictError, InputError, RejectedError, VersionConflictError
 from silo.bom.headers import Heading
-from silo.bom.numbers import Mark, parse_number, read_number, whole_number, yes_or_no
+from silo.bom.numbers import Mark, NumberReading, read_number, whole_number, yes_or_no
 from silo.bom.quantities import as_decimal, decimal_text, exact_product
 from silo.bom.text import character_problem
 from silo.tables.price_rows import PRICES, PriceRow, PriceRows, price_rows
@@ -209,36 +209,48 @@ def from_json(made: Mapping[str, Any]) -> SupplierPart:
     return SupplierPart(**{**made, **sizes, "prices": prices})
 
 
-def typed_text(value: Decimal) -> str:
-    """Write a decimal that is read in one way only: 1.2340, as 1.234 may be a thousand and more."""
-    text = decimal_text(value)
-    number = parse_number(text)
-    return f"{text}0" if number is not None and number.other is not None else text
+def texts_of(part: SupplierPart, write: Callable[[Decimal], str] = decimal_text) -> dict[str, str]:
+    """Write a supplier part as the cells of its row, which :func:`read_parts` reads.
 
-
-def texts_of(part: SupplierPart) -> dict[str, str]:
-    """Write a supplier part as the cells of its row, which :func:`read_parts` reads."""
+    write
+        writes a number as the reader does; :func:`numbers_of` reads it back, also 1.234.
+    """
     days = part.lead_time_days
     return {
         "supplier": part.supplier,
         "number": part.number,
         "link": part.link,
-        "pack_size": typed_text(part.pack_size),
-        "minimum": typed_text(part.minimum) if part.minimum else "",
-        "prices": "; ".join(f"{typed_text(least)}: {typed_text(price)}" for least, price in part.prices),
+        "pack_size": write(part.pack_size),
+        "minimum": write(part.minimum) if part.minimum else "",
+        "prices": "; ".join(f"{write(least)}: {write(price)}" for least, price in part.prices),
         "currency": part.currency,
         "lead_time_days": "" if days is None else str(days),
         "preferred": "yes" if part.preferred else "",
     }
 
 
+def numbers_of(
+    parts: Iterable[SupplierPart], write: Callable[[Decimal], str] = decimal_text
+) -> dict[str, Decimal]:
+    """Return each number in the cells of these parts as :func:`texts_of` writes it: its text → itself."""
+    numbers: set[Decimal] = set()
+    for part in parts:
+        numbers |= {part.pack_size, part.minimum, *(number for pair in part.prices for number in pair)}
+    return {write(number): number for number in numbers}
+
+
 @dataclass(frozen=True, slots=True)
 class _Reader:
-    """Reads the cells of a row. ``dot``, ``mark``: as :func:`silo.bom.numbers.read_number`."""
+    """Reads the cells of a row. ``dot``, ``mark``: as :func:`silo.bom.numbers.read_number`.
+
+    known
+        what the page showed: a text of these has one meaning, also where it could have two.
+    """
 
     mark: Mark | None = None
     dot: bool = False
     currency: str = "EUR"
+    known: Mapping[str, Decimal] = field(default_factory=dict)
 
     def read(self, cells: Mapping[str, str]) -> tuple[SupplierPart, list[str]]:
         """Read a row: the part, and what is wrong with it. If something is wrong, ignore the part."""
@@ -246,6 +258,8 @@ class _Reader:
 
         def amount(name: str, text: str, least: Decimal, most: Decimal) -> Decimal:
             reading = read_number(text, self.mark, points_are_decimal=self.dot)
+            if (shown := self.known.get(text.strip())) is not None:
+                reading = NumberReading(shown, "")
             if reading.value is not None and least <= reading.value <= most and _places(reading.value) >= -12:
                 return reading.value
             wanted = f"wanted a number from {least:f} to {most:f} with at most 12 decimals, got {text[:40]!r}"
@@ -305,9 +319,19 @@ def _places(value: Decimal) -> int:
     return exponent if isinstance(exponent, int) else -99
 
 
-def read_parts(tx: Tx, rows: Sequence[Mapping[str, str]], *, dot: bool = False) -> list[SupplierPart]:
-    """Read a table that a user filled in, without its empty rows. RejectedError lists all problems."""
-    reader = _Reader(None, dot, next(iter(rates_of(tx))))
+def read_parts(
+    tx: Tx,
+    rows: Sequence[Mapping[str, str]],
+    *,
+    dot: bool = False,
+    known: Mapping[str, Decimal] | None = None,
+) -> list[SupplierPart]:
+    """Read a table that a user filled in, without its empty rows. RejectedError lists all problems.
+
+    known
+        the numbers that the page showed (:func:`numbers_of`).
+    """
+    reader = _Reader(None, dot, next(iter(rates_of(tx))), known or {})
     read = [
         (number, *reader.read(cells))
         for number, cells in enumerate(rows, start=1)
@@ -558,13 +582,21 @@ def rates_of(tx: Tx) -> dict[str, Decimal]:
     return {currency: Decimal(rate) for currency, rate in typed.items()}
 
 
-def set_rates(tx: Tx, own: str, texts: Iterable[tuple[str, str]]) -> dict[str, Decimal]:
-    """Set the site's currency, and what one of each other is worth in it. RejectedError."""
+def set_rates(
+    tx: Tx, own: str, texts: Iterable[tuple[str, str]], known: Mapping[str, Decimal] | None = None
+) -> dict[str, Decimal]:
+    """Set the site's currency, and what one of each other is worth in it. RejectedError.
+
+    known
+        the rates as the page showed them: text → rate.
+    """
     rates, problems = {own.strip().upper(): Decimal(1)}, []
     for currency, text in ((code.strip().upper(), text.strip()) for code, text in texts):
         if not currency and not text:
             continue
         reading = read_number(text)
+        if (shown := (known or {}).get(text)) is not None:
+            reading = NumberReading(shown, "")
         if currency in rates:
             problems.append(f"{currency}: stands here twice")
         elif reading.value is None or not Decimal("1e-9") <= reading.value <= Decimal("1e9"):

@@ -24,13 +24,24 @@ from silo_server.services import items as item_service
 from silo_server.services import orders, releases, suppliers
 from silo_server.services.items import ItemChange, get_item
 from silo_server.services.orders import OrderRequest, OrderRow
-from silo_server.services.suppliers import COLUMNS, EXAMPLES, MOST_PARTS, typed_text
+from silo_server.services.suppliers import COLUMNS, EXAMPLES, MOST_PARTS
 from silo_server.web.accounts import Administrator, Reader, Writer
 from silo_server.web.attachments import kind_words
 from silo_server.web.forms import Form, amount, back, back_to, problems_of, text, texts, whole
 from silo_server.web.import_page import Problem, Upload, carried, checked, layout_of, reading
 from silo_server.web.releases_page import STAMPS
-from silo_server.web.render import N_, PAGE_ROWS, Address, _, isolate, page, page_of, segment
+from silo_server.web.render import (
+    N_,
+    PAGE_ROWS,
+    Address,
+    _,
+    in_reader_form,
+    isolate,
+    number_text,
+    page,
+    page_of,
+    segment,
+)
 
 router = APIRouter(include_in_schema=False)
 
@@ -52,7 +63,7 @@ def _suppliers(
     with call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
         changes = suppliers.supplier_changes_of(tx, item)
-    rows = typed or [suppliers.texts_of(part) for part in suppliers.supplier_parts_of(item)]
+    rows = typed or [suppliers.texts_of(part, number_text) for part in suppliers.supplier_parts_of(item)]
     empty = [dict.fromkeys(COLUMNS, "")] * min(EMPTY_ROWS, MOST_PARTS - len(rows))
     return page(
         call,
@@ -77,7 +88,8 @@ def save_suppliers(call: Writer, part_number: str, form: Form) -> Response:
     typed = [row for row in rows if any(row.values())]
     try:
         with call.write() as tx:
-            parts = suppliers.read_parts(tx, typed)
+            now = suppliers.supplier_parts_of(get_item(tx, part_number))
+            parts = suppliers.read_parts(tx, typed, known=suppliers.numbers_of(now, number_text))
             item, change = suppliers.set_supplier_parts(tx, part_number, parts, whole(form, "version"))
     except VersionConflictError:
         problem = _(
@@ -154,7 +166,7 @@ def order_page(
         recorded=recorded,
         at=at,
         now=now,
-        decimal=typed_text,
+        decimal=number_text,
         fact_of=_fact_of,
         table=table,
         counts=order_list.counts if order_list else {},
@@ -173,14 +185,19 @@ def _some(rows: Sequence[OrderRow]) -> dict[str, bool]:
 
 
 def _fact_of(row: OrderRow) -> str:
-    """Write what the box of a row records, without the quantity. The price is last: behind the last space is
-    the mark of a box, and a row with another price has to be chosen again.
+    """Write what the box of a row records, with the quantity that is shown.
+
+    The price is last: behind the last space is the mark of a box, and a row with another price has to be
+    chosen again.
     """
-    fact: dict[str, Any] = {"part_number": row.item.part_number, "unit": row.unit, "price": None}
-    if offer := row.offer:
-        of, price = offer.of, None if offer.price is None else str(offer.price)
-        fact = {"supplier": of.supplier, "number": of.number, "currency": of.currency, **fact, "price": price}
-    return json.dumps(fact)
+    offer = row.offer
+    quantity = decimal_text(offer.amount if offer else row.needed)
+    fact: dict[str, Any] = {"quantity": quantity, "part_number": row.item.part_number, "unit": row.unit}
+    if offer:
+        of = offer.of
+        fact = {"supplier": of.supplier, "number": of.number, "currency": of.currency, **fact}
+    price = None if offer is None or offer.price is None else str(offer.price)
+    return json.dumps({**fact, "price": price})
 
 
 @router.post("/items/{part_number}/order")
@@ -213,7 +230,9 @@ def _read_fact(written: str) -> dict[str, Any]:
 
 def _order_of(form: FormData, fact: Mapping[str, Any]) -> OrderedBody:
     number, unit = str(fact.get("part_number")), fact.get("unit")
-    quantity = amount(text(form, f"quantity.{number}.{unit or ''}"), number)
+    typed = text(form, f"quantity.{number}.{unit or ''}")
+    shown = str(fact.get("quantity"))
+    quantity = shown if typed == in_reader_form(shown) else amount(typed, number)
     given = {name: value for name, value in fact.items() if value is not None}
     try:
         return OrderedBody.model_validate(given | {"quantity": quantity})
@@ -269,7 +288,7 @@ def _prices(
         reading=reading(file, layout_read, PRICES) if file else None,
         action="/suppliers/check",
         own=own[0],
-        rates=typed if typed is not None else [(code, typed_text(rate)) for code, rate in rates],
+        rates=typed if typed is not None else [(code, number_text(rate)) for code, rate in rates],
     )
 
 
@@ -306,7 +325,8 @@ def set_rates(call: Administrator, form: Form) -> Response:
     typed = list(zip(texts(form, "code"), texts(form, "rate"), strict=False))
     try:
         with call.write() as tx:
-            suppliers.set_rates(tx, text(form, "own", 20), typed)
+            shown = {number_text(rate): rate for rate in suppliers.rates_of(tx).values()}
+            suppliers.set_rates(tx, text(form, "own", 20), typed, shown)
     except RejectedError as error:
         return _prices(call, problem=Problem.of(error), typed=typed)
     return back("/suppliers#rates", _("The currencies are saved."))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Awaitable, Callable
 from typing import Any, cast
-from urllib.parse import quote
+from urllib.parse import quote, unquote
 
 import anyio.to_thread
 from fastapi import Depends, FastAPI, Request
@@ -37,7 +37,17 @@ from silo_server.web import (
     waiting_page,
 )
 from silo_server.web.accounts import LoginNeededError, OldFormError, send_again, to_login
-from silo_server.web.render import LANGUAGE, LANGUAGE_COOKIE, N_, NOTICE, _, language_for, page_for
+from silo_server.web.render import (
+    LANGUAGE,
+    LANGUAGE_COOKIE,
+    N_,
+    NOTICE,
+    TIMEZONE,
+    TIMEZONE_COOKIE,
+    _,
+    language_for,
+    page_for,
+)
 
 ROUTERS = (
     accounts.router,
@@ -57,7 +67,7 @@ DEPENDENCIES = (Depends(refuse_unknown(NOTICE)),)
 
 
 class Spoken:
-    """Sets the language of a page; the answers of the API never depend on it."""
+    """Sets language and time zone of a page; the answers of the API never depend on them."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
@@ -67,6 +77,7 @@ class Spoken:
             request = Request(scope)
             chosen = request.cookies.get(LANGUAGE_COOKIE, "")
             LANGUAGE.set(language_for(chosen, request.headers.get("accept-language", "")))
+            TIMEZONE.set(unquote(request.cookies.get(TIMEZONE_COOKIE, "UTC"))[:100])
         await self.app(scope, receive, send)
 
 

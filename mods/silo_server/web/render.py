@@ -19,14 +19,17 @@ import json
 import re
 import unicodedata
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from datetime import UTC, datetime, tzinfo
 from decimal import ROUND_HALF_EVEN, Context, Decimal
 from functools import lru_cache
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 from urllib.parse import quote, unquote, urlencode
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from fastapi import Request
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -58,6 +61,9 @@ _CATALOGUES = {
 }
 # The language of the page that is answered; all that is no page is English.
 LANGUAGE: ContextVar[str] = ContextVar("LANGUAGE", default="en")
+# The reader's time zone, which the browser names in a cookie. Exports and the API are in UTC.
+TIMEZONE: ContextVar[str] = ContextVar("TIMEZONE", default="UTC")
+TIMEZONE_COOKIE = "silo_timezone"
 
 
 def language_for(chosen: str, accepted: str) -> str:
@@ -249,17 +255,42 @@ def quantity(value: float | Decimal | None, unit: str | None = None) -> str:
     return f"{shown} {isolate(unit)}" if unit else shown
 
 
+def number_text(value: Decimal) -> str:
+    """Write a number as the reader of the page does, with all its digits and no zero behind the last one."""
+    return in_reader_form(decimal_text(value))
+
+
 def in_reader_form(number: str) -> str:
     """Write a number with the decimal mark of the page's language."""
     return number if LANGUAGE.get() == "en" else number.replace(".", ",")
 
 
-@lru_cache(maxsize=4096)
 def when(stamp: str | None) -> Markup | str:
-    """Write a time: ``2026-02-08 22:15`` (UTC), with its full form for machines; a dash if there is none."""
-    if not stamp:
-        return "–"
-    return Markup('<time datetime="{}">{}</time>').format(wire_time(stamp), stamp[:16].replace("T", " "))
+    """Write a time: ``2026-02-08 22:15`` in the reader's zone, with its full form in UTC for machines.
+
+    A dash if there is none.
+    """
+    return _when(stamp, TIMEZONE.get()) if stamp else "–"
+
+
+@lru_cache(maxsize=4096)
+def _when(stamp: str, zone: str) -> Markup:
+    there = datetime.fromisoformat(stamp).astimezone(zone_of(zone))
+    return Markup('<time datetime="{}">{}</time>').format(wire_time(stamp), f"{there:%Y-%m-%d %H:%M}")
+
+
+@lru_cache(maxsize=256)
+def zone_of(name: str) -> tzinfo:
+    """Return the time zone of this name; UTC for one that this machine does not know."""
+    if name != "UTC" and re.fullmatch(r"[A-Za-z0-9_+-]{1,32}(/[A-Za-z0-9_+-]{1,32}){0,3}", name):
+        with suppress(ZoneInfoNotFoundError, ValueError, OSError):
+            return ZoneInfo(name)
+    return UTC
+
+
+def zone_name() -> str:
+    """Name the time zone of the page."""
+    return str(zone_of(TIMEZONE.get()))
 
 
 def size(count: int | None) -> str:
@@ -394,7 +425,9 @@ def environment(language: str) -> Environment:
         quantity=quantity, when=when, segment=segment, size=size, bdi=bdi, mass=mass, money=money
     )
     made.filters.update(spoken=spoken, sentence=sentence)
-    made.globals.update(plural=plural, _=_, languages=LANGUAGES, script_words=script_words)
+    made.globals.update(
+        plural=plural, _=_, languages=LANGUAGES, script_words=script_words, zone_name=zone_name
+    )
     return made
 
 

@@ -9,6 +9,20 @@ if (shown.searchParams.has("said")) {
   history.replaceState(history.state, "", shown);
 }
 
+// The server writes times in the zone that this cookie names. The first page has no cookie yet: it is in UTC.
+const zone = Intl.DateTimeFormat().resolvedOptions().timeZone;
+const cookie = `silo_timezone=${encodeURIComponent(zone || "UTC")}`;
+if (!document.cookie.split("; ").includes(cookie)) {
+  document.cookie = `${cookie}; path=/; max-age=31536000; samesite=lax`;
+  const local = new Intl.DateTimeFormat("sv", { dateStyle: "short", timeStyle: "short" });
+  document.addEventListener("DOMContentLoaded", () => {
+    for (const time of document.querySelectorAll("time[datetime]")) {
+      time.textContent = local.format(new Date(time.dateTime));
+    }
+    for (const name of document.querySelectorAll(".zone")) name.textContent = zone || "UTC";
+  });
+}
+
 const PATIENCE = 10000; // so long a form that was sent waits for its answer
 let sent = null;
 let given_up = null;
