@@ -196,7 +196,7 @@ def test_the_product_page_says_what_is_new(
     page = visitor.get(f"/items/{top}").body.decode()
     assert "1 open question</a> in 1 sub-assembly" in page
     assert "<strong>1 kg</strong>, 1 of 2 parts known" in page
-    assert "0 of 2 parts known" in page
+    assert 'Cost: none known, <span class="warn">not known for 2 parts' in page
     assert "Changed since you looked" not in page
     assert ">Mass each<" in page
     assert ">Cost each<" not in page
