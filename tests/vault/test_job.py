@@ -246,6 +246,32 @@ def test_a_worker_that_dies_costs_its_task_only(tmp_path: Path) -> None:
     assert Dying.deaths > 4
 
 
+class Broken(Executor):
+    """Takes one task and loses its workers; then it refuses all others, as a pool of processes does."""
+
+    made = 0
+
+    def __init__(self) -> None:
+        Broken.made += 1
+        self.tasks = 0
+
+    def submit(self, work: Any, /, *args: Any, **options: Any) -> Future[Any]:
+        self.tasks += 1
+        if self.tasks > 1 and Broken.made == 1:
+            raise BrokenProcessPool("killed")
+        future: Future[Any] = Future()
+        future.set_result(work(*args))
+        return future
+
+
+def test_a_pool_that_broke_between_two_tasks_is_made_anew(tmp_path: Path) -> None:
+    """A pool of processes notices a death only when the next task is given."""
+    write(tmp_path, FakeSilo(), {100 + n: {n % 4: n + 1} for n in range(20)})
+    Broken.made = 0
+    assert answers(tmp_path, Pool(Broken, 2, worth=0, chunk=4)) == answers(tmp_path, None)
+    assert Broken.made > 1
+
+
 def _kill_some(questions: Any, supplies: Any, run: str) -> Any:
     if any("a107" in question.path for question in questions):
         os.kill(os.getpid(), signal.SIGKILL)

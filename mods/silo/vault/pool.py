@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, Future
+from concurrent.futures import BrokenExecutor, Executor, Future
 from contextlib import contextmanager
 from typing import Any
 from uuid import uuid4
@@ -54,10 +54,15 @@ class Pool:
         self._executor: Executor | None = None
 
     def submit(self, questions: Sequence[Question], known_files: KnownFiles | None) -> Future[Done]:
-        """Give questions to a worker."""
+        """Give questions to a worker. A future that failed if the workers are lost already."""
         if self._executor is None:
             self._executor = self._make()
-        return self._executor.submit(work, questions, known_files, self._run)
+        try:
+            return self._executor.submit(work, questions, known_files, self._run)
+        except BrokenExecutor as error:  # a worker died on earlier questions: all are asked again
+            lost: Future[Done] = Future()
+            lost.set_exception(error)
+            return lost
 
     def renew(self) -> None:
         """Shut down an executor that lost its workers, or that is no longer needed."""
