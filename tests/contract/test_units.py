@@ -131,3 +131,27 @@ def test_half_a_metre_is_ordered_at_the_price_of_a_metre(api: Api) -> None:
     (part,) = api.get(f"/api/items/{product}/order?rest=true")["parts"]
     assert (part["ordered"], part["needed"], part["cost"]) == ("0.2", "0.3", "3")
     assert "ordered in another unit: 1 box" in part["remarks"]
+
+
+@BOTH
+def test_a_new_unit_of_an_item_does_not_change_what_its_lines_say(api: Api) -> None:
+    """Three pieces of a hose do not become three metres: the line names pieces, and is a question."""
+    product, hose = hose_of(api, None)
+    other = api.item()
+    api.add_line(product, hose, quantity=3)
+    api.add_line(other, hose, quantity=250, unit="mm")
+    line = {"parts": [{"part_number": hose, "quantity": "2"}]}
+    api.good("POST", f"/api/items/{product}/orders", line)
+    api.good("PUT", f"/api/items/{hose}", {"unit": "m"})
+    kept = api.lines(product)[hose]
+    assert (kept["quantity"], kept["unit"], kept["unit_open"]) == (3, "pcs", True)
+    assert (api.lines(other)[hose]["unit"], api.lines(other)[hose]["unit_open"]) == ("mm", False)
+    (row,) = api.get(f"/api/items/{product}/order")["parts"]
+    assert "ordered in another unit: 2 pcs" in row["remarks"]
+    api.good("PUT", f"/api/items/{hose}", {"unit": "pcs"})
+    assert api.lines(product)[hose]["unit_open"] is False
+    (change, *_) = api.get(bom(product, "history"))
+    assert "its line stays in pcs" in change["summary"]
+    version = api.get(bom(product, "review"))["version"]
+    api.good("PUT", f"/api/items/{hose}", {"unit": "Stk."})
+    assert api.get(bom(product, "review"))["version"] == version

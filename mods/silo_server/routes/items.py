@@ -52,6 +52,7 @@ from silo_server.routes.requests import BoundedRoute, ExpectedVersion, idempoten
 from silo_server.schema import describe, describe_form, find_schema, schemas
 from silo_server.services import attachments, documents, items, revisions, scene, search
 from silo_server.services.bom.last_sync import NEVER, LastSync, last_sync, last_syncs
+from silo_server.services.bom.unit_change import change_item_and_lines
 from silo_server.services.documents import (
     documents_by_uuid,
     documents_holding,
@@ -187,7 +188,7 @@ def change_item(call: Editor, part_number: str, body: ItemChangeBody, expected: 
     texts = body.model_dump(include=_TEXTS)
     change = items.ItemChange(texts=texts, **body.model_dump(exclude=_TEXTS))
     with call.write() as tx:
-        return _answer(items.change_item(tx, part_number, change, expected))
+        return _answer(change_item_and_lines(tx, part_number, change, expected))
 
 
 @router.patch(

@@ -26,11 +26,11 @@ from silo_server.db.rows import one_of
 from silo_server.db.tables import items
 from silo_server.db.transaction import Tx
 from silo_server.schema import ITEM_TYPES, Schema, find_schema
+from silo_server.services.bom.unit_change import change_item_and_lines
 from silo_server.services.import_file import read_import
 from silo_server.services.items import (
     ItemChange,
     NewItem,
-    change_item,
     check_number,
     create_item,
     get_by_numbers,
@@ -216,7 +216,7 @@ def apply_parts(tx: Tx, read: PartRows, category: str = "") -> list[ImportedPart
         if row.new is not None:
             create_item(tx, row.new)
         elif row.change is not None:
-            change_item(tx, row.part_number, row.change)
+            change_item_and_lines(tx, row.part_number, row.change)
     return plan
 
 

@@ -28,6 +28,7 @@ from silo_server.routes.call import Call
 from silo_server.routes.items import numbered, store_file
 from silo_server.schema import ITEM_TYPES, Category, find_schema, text_hints
 from silo_server.services import items as service
+from silo_server.services.bom.unit_change import change_item_and_lines
 from silo_server.services.items import ItemChange, NewItem, get_item
 from silo_server.services.product.where_used import where_used
 from silo_server.services.releases import draft_of
@@ -308,7 +309,7 @@ def _change(tx: Tx, item: Item, typed: Mapping[str, str], mine: set[str], commen
     texts = {name: own.pop(name) for name in TEXTS if name in own}
     source: FactSource = "scale" if typed.get("weighed") and mine >= {"p.mass_kg"} else "hand"
     given = ItemChange(**own, texts=texts, properties=properties, comment=comment, source=source)
-    return service.change_item(tx, item.part_number, given)
+    return change_item_and_lines(tx, item.part_number, given)
 
 
 def _properties(
