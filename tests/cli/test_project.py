@@ -9,16 +9,18 @@ import shutil
 import zipfile
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import pytest
 from fcstd_writer import Doc, Raw, locals_, part
-from server_testing import Api
+from server_testing import Api, sqlite_database
 
 from silo.bom.walk.links import extract
 from silo.bom.walk.roots import choose_assembly
 from silo.fcstd import Library
 from silo.outbox.store import Store
 from silo.project_folder import PROJECT_FILE, FileRecord, Project
+from silo_server.run import running_server
 
 
 @pytest.fixture
@@ -292,4 +294,55 @@ def test_a_bom_that_is_held_is_said_and_goes_out_when_its_file_is_back(
     assert silo.client.get_item(item.part_number).last_sync.held is None
     assert len(silo.client.get_bom(item.part_number)) == 3
     assert run("commit", registered).code == 0
+    assert run("status", registered).code == 0
+
+
+def test_a_server_that_was_set_back_is_asked_about_once(
+    robot: Path, run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """``status`` and ``commit`` recognise it, and end with 1; one ``--on-top`` sends all that it has lost."""
+    token, database = "silo_" + "b2" * 20, tmp_path / "server" / "silo.db"
+    database.parent.mkdir()
+    monkeypatch.setenv("SILO_API_TOKEN", token)
+    with running_server(sqlite_database(database), token=token) as server:
+        monkeypatch.setenv("SILO_API_URL", server.base_url)
+        port = urlsplit(server.base_url).port or 0
+        assert run("register", robot / "asm" / "Top.FCStd", "--yes").code == 0
+        assert run("commit", robot).code == 0
+    older = tmp_path / "older.db"
+    shutil.copy(database, older)
+    with running_server(f"sqlite:///{database}", token=token, port=port):
+        for place in ("parts/Arm.FCStd", "Master.FCStd"):
+            edit(robot / place, "second")
+        assert run("commit", robot).code == 0
+    for rest in database.parent.glob("silo.db*"):
+        rest.unlink()
+    shutil.copy(older, database)
+    with running_server(f"sqlite:///{database}", token=token, port=port):
+        told = run("status", robot, "--json")
+        lost = {"parts/Arm.FCStd", "Master.FCStd"}
+        assert told.code == 1
+        assert {place for place, state in states(told).items() if state == "server set back"} == lost
+        assert {state for place, state in states(told).items() if place not in lost} == {"same"}
+        ran = run("commit", robot)
+        assert ran.code == 1
+        assert "--on-top sends all such files again" in ran.out
+        assert run("commit", robot, "--on-top").code == 0
+        after = run("status", robot, "--json")
+        assert (after.code, set(states(after).values())) == (0, {"same"})
+
+
+def test_a_commit_that_is_held_ends_with_1(registered: Path, silo: Any, run: Any, tmp_path: Path) -> None:
+    """For a colleague's newer file; the next commit that sends nothing ends with 1 too."""
+    assert run("commit", registered).code == 0
+    elsewhere = tmp_path / "elsewhere"
+    shutil.copytree(registered, elsewhere)
+    edit(elsewhere / "parts" / "Arm.FCStd", "theirs")
+    assert run("commit", elsewhere).code == 0
+    edit(registered / "parts" / "Arm.FCStd", "mine")
+    for _ in range(2):
+        ran = run("commit", registered, "--json")
+        assert ran.code == 1
+        assert states(ran)["parts/Arm.FCStd"] in ("both", "held")
+    assert run("commit", registered, "--on-top").code == 0
     assert run("status", registered).code == 0

@@ -196,3 +196,27 @@ def test_the_pages_of_a_release(url: str, tmp_path: Path) -> None:
         assert viewer.post(f"{path}/A/end", status="obsolete").status == 303
         assert "obsolete" in page_of(viewer, path)
         assert viewer.get(f"{path}/Q").status == 404
+
+
+@over("sqlite")
+def test_a_site_that_wants_drawings_releases_nothing_without(url: str, tmp_path: Path) -> None:
+    """Of its own parts only; a bought part comes with whatever its supplier sends."""
+    wants = Settings(database_url=url, files_dir=tmp_path, release_wants="drawing, step")
+    with running_server(url, token=TOKEN, settings=wants) as server, Api(server.base_url, TOKEN) as api:
+        own, bought = api.item(sourcing_type="manufactured"), api.item(sourcing_type="purchased")
+        top = api.item(item_type="assembly", sourcing_type="manufactured")
+        api.merge(top, {own: 1, bought: 4})
+        for item in (top, own):
+            put_file(api, item, item.encode())
+            body, headers = form_body({"file": ("a.pdf", b"%PDF-1.7 drawing")})
+            api.good("POST", f"/api/items/{item}/files", body=body, headers=headers)
+        api.good("POST", f"/api/items/{top}/releases", {})
+        (told,) = api.get(f"/api/items/{top}/releases")["releases"]
+        lacking = sorted(line for line in told["blocks"] if "STEP" in line or "drawing" in line)
+        assert lacking == sorted(f"{item}: no STEP file" for item in (top, own))
+
+
+def test_a_kind_that_the_site_cannot_want(tmp_path: Path) -> None:
+    """A wrong word would want nothing, and each release would go out."""
+    with pytest.raises(ConfigError, match="drawings"):
+        Settings(database_url=f"sqlite:///{tmp_path}/x.db", release_wants="drawings")
