@@ -266,10 +266,10 @@ class AddOn:
         status, tree = self._signs
         status.draw(shown)
         held = {held.path: held.sentence for held in shown.held}
-        docs = [doc for doc in host.documents() if held and doc.FileName]
-        tree.draw(
-            {str(doc.Label): held[one_path(doc.FileName)] for doc in docs if one_path(doc.FileName) in held}
-        )
+        docs = [*host.documents()]
+        paths = {str(doc.Label): one_path(doc.FileName) for doc in docs if held and doc.FileName}
+        why = {label: held[path] for label, path in paths.items() if path in held}
+        tree.draw(why, {str(doc.Label) for doc in docs})
 
     def _presence(self, colleagues: Mapping[str, Newer]) -> tuple[str, ...]:
         """Say which open documents colleagues have committed since they were opened."""

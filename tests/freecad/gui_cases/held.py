@@ -37,9 +37,10 @@ def tips() -> list[str]:
     for tree in Gui.getMainWindow().findChildren(QtWidgets.QTreeWidget):
         model = tree.model()
         if tree.metaObject().className() == "Gui::TreeWidget" and model.rowCount():
-            top = model.index(0, 0)
-            rows = (model.index(row, 0, top) for row in range(model.rowCount(top)))
-            found += [str(model.data(row, QtCore.Qt.ItemDataRole.ToolTipRole) or "") for row in rows]
+            tops = [model.index(row, 0) for row in range(model.rowCount())]
+            below = [model.index(row, 0, top) for top in tops for row in range(model.rowCount(top))]
+            tips = (model.data(row, QtCore.Qt.ItemDataRole.ToolTipRole) for row in (*tops, *below))
+            found += [str(tip) for tip in tips if tip and "held" in str(tip)]
     return found
 
 

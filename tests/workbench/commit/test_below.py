@@ -136,7 +136,46 @@ def test_an_older_file_below_is_said(week: Week) -> None:
     week.edit("Top")
     week.commit("Top")
     (box,) = [one for one in week.office.session.shown.activity.entries if "Not all files" in one.title]
-    assert [line.text for line in box.lines] == ["Plate.FCStd: newer in Silo", "0 sent, 2 the same in Silo"]
+    assert [line.text for line in box.lines] == [
+        "Plate.FCStd: newer in Silo",
+        "Top.FCStd: sent",
+        "Sub.FCStd: the same",
+        "Skeleton.FCStd: the same",
+    ]
+
+
+def test_each_file_below_has_its_line_and_the_look_comes_after_the_sending(week: Week) -> None:
+    """Sent, or the same; also of a file that nothing has open."""
+    week.edit("Plate")
+    week.save("Plate")
+    del week.docs["Skeleton"]
+    week.edit("Top")
+    week.commit("Top")
+    box = week.office.session.shown.activity.entries[0]
+    assert box.title == "4 files of it are in Silo as they are here: Top.FCStd"
+    assert {line.text for line in box.lines} == {
+        "Plate.FCStd: sent",
+        "Sub.FCStd: the same",
+        "Skeleton.FCStd: the same",
+        "Top.FCStd: sent",
+    }
+
+
+def test_a_file_that_is_written_while_it_is_sent_is_no_success(week: Week) -> None:
+    """What Silo has after the sending decides, not what was put into the queue."""
+    week.edit("Plate")
+    week.save("Plate")
+    week.edit("Top")
+
+    def written(name: str) -> None:
+        if name == "upload_file" and len(week.office.files("Top")) == 2:  # now Plate is on its way
+            week.office.silo.before = lambda _name: None
+            (week.root / "Plate.FCStd").write_bytes(week.content("Plate", "a sync tool"))
+
+    week.office.silo.before = written
+    week.commit("Top")
+    box = next(one for one in week.office.session.shown.activity.entries if "Not all files" in one.title)
+    assert box.lines[0].text == "Plate.FCStd: edited since its commit"
 
 
 def test_nobody_is_in_conflict_with_their_own_commit(week: Week) -> None:

@@ -27,8 +27,8 @@ from silo.platform.spelling import one_path
 from silo.project_folder import record_of
 from silo.workbench.activity.box import Action, Do, PaneEntry, not_in_silo_key, own_box
 from silo.workbench.colleagues.look import FileToCheck, look
-from silo.workbench.colleagues.states import state_words
 from silo.workbench.colleagues.theirs import Choice, Theirs
+from silo.workbench.commit.below import below_box
 from silo.workbench.commit.desk import CommitAnswer, CommitDesk
 from silo.workbench.commit.plan import CommitPlan, DocumentRow, DocumentState, plan, refusal
 from silo.workbench.commit.same_parts import Decisions
@@ -41,7 +41,7 @@ from silo.workbench.tone import Tone
 from silo.workbench.words import translate
 
 if TYPE_CHECKING:
-    from silo.vault.project import SentAlong
+    from silo.vault.project import FileStanding, SentAlong
 
 
 class CommitFlow:
@@ -200,8 +200,8 @@ class CommitFlow:
         def sent(along: SentAlong) -> None:
             if along.queued or along.more:
                 self._session.send(force=True)
-            if along.left_out:
-                self._session.add(left_out_box(path, along))
+            if along.standings:
+                self._prove(path, along, skip)
 
         def failed(error: SiloError) -> None:
             self._tell_error(os.path.basename(path), str(error))
@@ -216,6 +216,25 @@ class CommitFlow:
 
         self._session.after_keeping(ask)
         yield from ()
+
+    def _prove(self, path: str, along: SentAlong, sent: set[str]) -> None:
+        """Look again after sending, and say of each file below whether Silo has it as it is here."""
+        paths = {one.file.path for one in along.standings if one.file.place in along.queued} | sent
+
+        def look(client: Any, _control: Any) -> tuple[FileStanding, ...]:
+            from silo.vault.project import find_project, stand  # late: FreeCAD's start waits for this module
+
+            return tuple(stand([path], find_project([path]), client, self._session.outbox)[1])
+
+        def done(standings: tuple[FileStanding, ...]) -> None:
+            if len(standings) > 1:
+                self._session.add(below_box(path, standings, paths))
+
+        def failed(_error: SiloError) -> None:  # without an answer, what was found before the sending counts
+            if along.left_out:
+                self._session.add(below_box(path, along.standings, paths))
+
+        self._session.ask(translate("Silo", "Looking at what Silo has now"), look, done, failed)
 
     def _registering(self, path: str) -> Iterator[CommittedDocument]:
         """Offer registering, a turn after the documents are saved."""
@@ -421,15 +440,6 @@ def commit_of(
         allow_missing=allow_missing,
         remark=taken.problem,
     )
-
-
-def left_out_box(path: str, along: SentAlong) -> PaneEntry:
-    """Make the box for a commit of which files below it were left out: one line for each, with the reason."""
-    title = translate("Silo", "Not all files below it are in Silo: {name}", name=os.path.basename(path))
-    lines = [f"{one.file.place}: {state_words(one.state)}" for one in along.left_out]
-    same = sum(one.state.name == "SAME" for one in along.standings)
-    rest = translate("Silo", "{n} sent, {same} the same in Silo", n=len(along.queued), same=same)
-    return own_box(f"left-out:{path}:{time.time()}", title, *lines, rest, tone=Tone.ERROR)
 
 
 def not_in_silo(taken: Snapshot) -> PaneEntry:

@@ -7,7 +7,7 @@ sign is shown and nothing else is lost.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets
@@ -25,11 +25,15 @@ class TreeSign:
         self._window = window
         self._marked: dict[str, str] = {}
 
-    def draw(self, why: Mapping[str, str]) -> None:
-        """Mark the documents of these labels, each with its reason; all others lose their mark."""
+    def draw(self, why: Mapping[str, str], labels: Collection[str]) -> None:
+        """Mark the documents of these labels, each with its reason; all others lose their mark.
+
+        labels
+            those of all open documents.
+        """
         if not why and not self._marked:
             return
-        for model, index in self._documents():
+        for model, index in self._documents(labels):
             label = str(model.data(index, _TEXT))
             if label in why:
                 model.setData(index, why[label], _TIP)
@@ -39,15 +43,17 @@ class TreeSign:
                 model.setData(index, self._plain_icon(), _ICON)
         self._marked = dict(why)
 
-    def _documents(self) -> Iterator[tuple[Any, Any]]:
+    def _documents(self, labels: Collection[str]) -> Iterator[tuple[Any, Any]]:
         # By the model: PySide's own objects for the items of a tree that C++ made do not live long enough.
         for tree in self._window.findChildren(QtWidgets.QTreeWidget):
             if tree.metaObject().className() != "Gui::TreeWidget":
                 continue
             model = tree.model()
-            for at in range(model.rowCount()):
-                top = model.index(at, 0)
-                yield from ((model, model.index(row, 0, top)) for row in range(model.rowCount(top)))
+            for top in (model.index(row, 0) for row in range(model.rowCount())):
+                if str(model.data(top, _TEXT)) in labels:
+                    yield model, top
+                else:  # before 1.1 all documents are below one root
+                    yield from ((model, model.index(row, 0, top)) for row in range(model.rowCount(top)))
 
     @staticmethod
     def _plain_icon() -> Any:

@@ -372,6 +372,47 @@
             <translation type="unfinished" />
         </message>
         <message>
+            <location filename="../../commit/below.py" />
+            <source>Not all files below it are in Silo: {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/below.py" />
+            <source>{n} file of it is in Silo as it is here: {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/below.py" />
+            <source>{n} files of it are in Silo as they are here: {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/below.py" />
+            <source>{n} file of it waits to be sent: {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/below.py" />
+            <source>{n} files of it wait to be sent: {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/below.py" />
+            <location filename="../../revisions/project.py" />
+            <source>its BOM is held: {why}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/below.py" />
+            <source>sent</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/below.py" />
+            <source>the same</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
             <location filename="../../commit/dialog.py" />
             <location filename="../../commit/flow.py" />
             <source>Commit to Silo</source>
@@ -507,6 +548,11 @@
         </message>
         <message>
             <location filename="../../commit/flow.py" />
+            <source>Looking at what Silo has now</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
             <location filename="../../session/session.py" />
             <source>Looking for colleagues' commits</source>
             <translation type="unfinished" />
@@ -529,16 +575,6 @@
         <message>
             <location filename="../../commit/flow.py" />
             <source>There is no connection now: the files are saved, and sent later.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>Not all files below it are in Silo: {name}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>{n} sent, {same} the same in Silo</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -2118,11 +2154,6 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../revisions/ghosts.py" />
             <source>Not compared: {unknown} in groups and arrays without links.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../revisions/project.py" />
-            <source>its BOM is held: {why}</source>
             <translation type="unfinished" />
         </message>
         <message>

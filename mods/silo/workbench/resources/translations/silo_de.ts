@@ -372,6 +372,47 @@
             <translation>… und {n} weitere Zeilen</translation>
         </message>
         <message>
+            <location filename="../../commit/below.py" />
+            <source>Not all files below it are in Silo: {name}</source>
+            <translation>Nicht alle Dateien darunter sind in Silo: {name}</translation>
+        </message>
+        <message>
+            <location filename="../../commit/below.py" />
+            <source>{n} file of it is in Silo as it is here: {name}</source>
+            <translation>{n} Datei davon ist in Silo wie hier: {name}</translation>
+        </message>
+        <message>
+            <location filename="../../commit/below.py" />
+            <source>{n} files of it are in Silo as they are here: {name}</source>
+            <translation>{n} Dateien davon sind in Silo wie hier: {name}</translation>
+        </message>
+        <message>
+            <location filename="../../commit/below.py" />
+            <source>{n} file of it waits to be sent: {name}</source>
+            <translation>{n} Datei davon wartet auf das Senden: {name}</translation>
+        </message>
+        <message>
+            <location filename="../../commit/below.py" />
+            <source>{n} files of it wait to be sent: {name}</source>
+            <translation>{n} Dateien davon warten auf das Senden: {name}</translation>
+        </message>
+        <message>
+            <location filename="../../commit/below.py" />
+            <location filename="../../revisions/project.py" />
+            <source>its BOM is held: {why}</source>
+            <translation>ihre Stückliste wird zurückgehalten: {why}</translation>
+        </message>
+        <message>
+            <location filename="../../commit/below.py" />
+            <source>sent</source>
+            <translation>gesendet</translation>
+        </message>
+        <message>
+            <location filename="../../commit/below.py" />
+            <source>the same</source>
+            <translation>unverändert</translation>
+        </message>
+        <message>
             <location filename="../../commit/dialog.py" />
             <location filename="../../commit/flow.py" />
             <source>Commit to Silo</source>
@@ -507,6 +548,11 @@
         </message>
         <message>
             <location filename="../../commit/flow.py" />
+            <source>Looking at what Silo has now</source>
+            <translation>Sieht nach, was Silo jetzt hat</translation>
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
             <location filename="../../session/session.py" />
             <source>Looking for colleagues' commits</source>
             <translation>Prüfen, was andere eingecheckt haben</translation>
@@ -530,16 +576,6 @@
             <location filename="../../commit/flow.py" />
             <source>There is no connection now: the files are saved, and sent later.</source>
             <translation>Zurzeit besteht keine Verbindung: Die Dateien sind gespeichert und werden später gesendet.</translation>
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>Not all files below it are in Silo: {name}</source>
-            <translation>Nicht alle Dateien darunter sind in Silo: {name}</translation>
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>{n} sent, {same} the same in Silo</source>
-            <translation>{n} gesendet, {same} gleich in Silo</translation>
         </message>
         <message>
             <location filename="../../commit/flow.py" />
@@ -2123,11 +2159,6 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../revisions/project.py" />
-            <source>its BOM is held: {why}</source>
-            <translation>ihre Stückliste wird zurückgehalten: {why}</translation>
-        </message>
-        <message>
-            <location filename="../../revisions/project.py" />
             <source>unsaved edits</source>
             <translation>ungespeicherte Änderungen</translation>
         </message>
@@ -2667,6 +2698,10 @@ Sie werden in {folder} installiert.</translation>
             <location filename="../../../outbox/status_text.py" />
             <source>Nothing is sent to {host} for {time}: {reason}</source>
             <translation>Für {time} wird nichts an {host} gesendet: {reason}</translation>
+        </message>
+        <message>
+            <source>{n} sent, {same} the same in Silo</source>
+            <translation type="vanished">{n} gesendet, {same} gleich in Silo</translation>
         </message>
     </context>
     <context>
