@@ -24,6 +24,7 @@ from silo.inertia.arrays import Floats
 from silo.inertia.links.claims import ROOT_LINK
 from silo.inertia.links.frames import MOST_RAD, origin_frame
 from silo.inertia.rigid import MassProps, tensor_words
+from silo.inertia.xacro_files import expanded, is_xacro
 
 MOVING = ("revolute", "continuous", "prismatic")
 """Kinds of joints that have one position."""
@@ -63,13 +64,14 @@ class UrdfShape:
 
 
 def read_bytes(path: Path | str) -> bytes:
-    """Read the bytes of a URDF file; InputError if it is absent, or far too large for one."""
+    """Read a URDF file, a xacro file expanded; InputError if it is absent, or far too large for one."""
     try:
         if Path(path).stat().st_size > MAX_BYTES:
             raise InputError(f"{path}: larger than {MAX_BYTES // 2**20} MB, which no URDF is")
-        return Path(path).read_bytes()
+        data = Path(path).read_bytes()
     except OSError as error:
         raise InputError(f"{path}: the URDF cannot be read ({error.strerror or error})") from error
+    return expanded(Path(path)) if is_xacro(data) else data
 
 
 @dataclass(eq=False)

@@ -109,12 +109,17 @@ def run_inertia(args: argparse.Namespace) -> int:
     """Calculate and show; returns 1 for warnings with --strict, or items that a push did not find."""
     need_inertia_extra()
     check_options(args, asks_server=args.push and not args.dry_run)
+    from silo.inertia.xacro_files import refuse_writing
+
     if not args.urdf and is_urdf(args.assembly):
         args.urdf = args.assembly
     if (args.urdf_out or args.in_place) and not args.urdf:
         raise InputError("--urdf-out and --in-place do nothing without --urdf, or a URDF as ASSEMBLY")
     if args.urdf_out and args.in_place:
         raise InputError("--urdf-out and --in-place name two places for one URDF; give one of them")
+    for written in (args.urdf if args.in_place else None, args.urdf_out):
+        if written:
+            refuse_writing(Path(written))
     if args.snippet and args.json:
         raise InputError("--snippet and --json both go to standard output; use --report FILE.json")
     from silo.inertia.calculation import calculate
