@@ -85,7 +85,18 @@ def test_suggestions_need_equal_digits() -> None:
     """A near name is proposed only where every number in it agrees."""
     assert Suggester(["Hex bolt M4", "Hex bolt M5", "nut"]).near("Hexbolt M4") == ("Hex bolt M4",)
     assert Suggester(["M3x12", "M3x100"]).near("M3x10") == ()
-    assert Suggester(["bracket_3", "bracket"]).near("bracket_2") == ()
+    assert Suggester(["bracket_3"]).near("bracket_2") == ()
+
+
+@pytest.mark.parametrize(
+    ("part", "row"),
+    [
+        ("shaft_1", "shaft"), ("shaft", "shaft_1"), ("Arm-1", "Arm"), ("Arm (2)", "Arm"), ("base v3", "base"),
+        ("base v3", "Base v4"),
+    ],
+)  # fmt: skip
+def test_a_mark_of_a_copy_or_of_a_version_is_proposed(part: str, row: str) -> None:
+    assert Suggester([row, "M3x8", "plate"]).near(part) == (row,)
 
 
 def test_suggestions_end_with_their_budget() -> None:

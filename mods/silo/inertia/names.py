@@ -85,8 +85,26 @@ def digits(name: str) -> tuple[str, ...]:
     return tuple(re.findall(r"\d+", name))
 
 
+_MARK = re.compile(r"(?: (?:v|rev ?)?\d{1,3}| \(\d{1,3}\))$")
+
+_NUMBER = re.compile(r" \(?\d{1,3}\)?$")
+
+
+def _stem(name: str) -> str:
+    """Return a name without the mark of a copy or of a version; the whole name if nothing else is left."""
+    text = plain(name)
+    return _MARK.sub("", text) or text
+
+
+def _may_be(one: str, other: str) -> bool:
+    """Return False for two parts that are numbered: "bracket 2" is not "bracket 3"."""
+    return not (_NUMBER.search(one) and _NUMBER.search(other))
+
+
 class Suggester:
-    """Names a user may have meant: alike by difflib, all digits equal. For messages only.
+    """Names a user may have meant. For messages only.
+
+    They are alike by difflib with all digits equal, or the same but for a mark of a copy or of a version.
 
     ``budget``: comparisons before it falls silent; proposals are a courtesy, and must not take minutes for a
     BOM of thousands that fits nothing.
@@ -94,17 +112,25 @@ class Suggester:
 
     def __init__(self, candidates: Iterable[str], budget: int = 100_000) -> None:
         self._by_digits: dict[tuple[str, ...], dict[str, str]] = {}
+        self._by_stem: dict[str, dict[str, str]] = {}
         for name in candidates:
             self._by_digits.setdefault(digits(name), {}).setdefault(plain(name), name)
+            self._by_stem.setdefault(_stem(name), {}).setdefault(plain(name), name)
         self._budget = budget
 
     def near(self, name: str, limit: int = 3) -> tuple[str, ...]:
         """Return up to ``limit`` similar names, the most similar first."""
+        wanted = plain(name)
+        same = self._by_stem.get(_stem(name), {})
+        # A number or a version behind the name: "shaft" and "shaft_1", "Arm-1" and "Arm", "base v3".
+        marked = tuple(other for key, other in same.items() if key != wanted and _may_be(wanted, key))
+        return tuple(dict.fromkeys((*marked, *self._alike(name, wanted, limit))))[:limit]
+
+    def _alike(self, name: str, wanted: str, limit: int) -> tuple[str, ...]:
         fitting = self._by_digits.get(digits(name), {})
         self._budget -= len(fitting)
         if not fitting or self._budget < 0:
             return ()
-        wanted = plain(name)
         turned = " ".join(sorted(wanted.split()))
         nearest = []
         for candidate in fitting:

@@ -425,3 +425,17 @@ def test_a_card_with_the_density_of_a_guess_settles_it() -> None:
     assert guess.doubt
     card = Material("tin can", guess.material.density)
     assert MaterialTable((package_rows(),), lambda: [card]).find("tin can") == MaterialHit(card)
+
+
+@pytest.mark.parametrize(
+    ("text", "density"),
+    [
+        ("Gray iron", 7150), ("Iron, Gray", 7150), ("grey iron", 7150), ("Gray cast iron", 7200),
+        ("White iron", 7700), ("Red brass", 8750), ("Brass, red", 8750),
+        ("Gray steel", 7850), ("gray aluminum", 2700),
+    ],
+)  # fmt: skip
+def test_a_colour_is_part_of_a_metal_s_name_where_a_metal_has_it(text: str, density: float) -> None:
+    answer = load_materials(freecad=False).find(text)
+    assert isinstance(answer, MaterialHit)
+    assert answer.material.density == density
