@@ -416,3 +416,39 @@ def test_an_import_is_all_or_nothing(api: Api) -> None:
     assert any("row 3" in said and "NOPE-1" in said for said in problems)
     assert any("row 4" in said and "cheap" in said for said in problems)
     assert api.get(suppliers(one))["supplier_parts"] == []
+
+
+def as_odoo_reads(table: str) -> dict[tuple[str, str], list[tuple[str, str, str]]]:
+    """A row without a vendor is one more line of the order above it."""
+    read: dict[tuple[str, str], list[tuple[str, str, str]]] = {}
+    key = ("", "")
+    for row in csv.DictReader(io.StringIO(table)):
+        if row["Vendor"]:
+            key = row["Vendor"], row["Currency"]
+        line = (row["Order Lines/Product"], row["Order Lines/Quantity"], row["Order Lines/Unit Price"])
+        read.setdefault(key, []).append(line)
+    return read
+
+
+def test_an_order_for_odoo_and_for_inventree(api: Api, product: tuple[str, ...]) -> None:
+    """Their columns, no notes on top; InvenTree counts packs; a part without a supplier is no silent gap."""
+    top, _sub, screw, plate = product
+    more = api.item(name="Nut")
+    api.merge(top, {screw: 3, more: 2, plate: 1})
+    given(api, screw, MISUMI)
+    api.good("PUT", f"/api/items/{more}", {"sourcing_type": "purchased"})
+    answer = api.bad(400, "GET", order(top, ".csv?layout=odoo"))
+    assert f"no supplier is known of {more}" in str(answer)
+    given(api, more, {**MISUMI, "supplier": "Acme", "number": "N1", "pack_size": "1"})
+    table = api.call("GET", order(top, ".csv?layout=odoo")).body.decode("utf-8-sig")
+    orders = as_odoo_reads(table)
+    name = api.get(f"/api/items/{screw}")["name"]
+    assert orders[("Acme", "EUR")] == [(f"[{more}] Nut", "2", "0.12")]
+    assert orders[("Misumi", "EUR")] == [(f"[{screw}] {name}", "100", "0.12")]
+    answer = api.bad(400, "GET", order(top, ".csv?layout=inventree"))
+    assert "one supplier at a time" in str(answer)
+    table = api.call("GET", order(top, ".csv?layout=inventree&supplier=Misumi")).body.decode("utf-8-sig")
+    (row,) = csv.DictReader(io.StringIO(table))
+    assert (row["part"], row["quantity"], row["purchase_price"]) == ("CB8-20", "1", "12")
+    assert (row["purchase_price_currency"], row["reference"]) == ("EUR", screw)
+    assert api.call("GET", order(top, ".csv?layout=sap")).status == 400

@@ -30,6 +30,7 @@ from silo_server.routes.models import Brief, RequestBody, Short, Text
 from silo_server.routes.requests import BoundedRoute, ExpectedVersion
 from silo_server.services import orders, suppliers
 from silo_server.services.items import get_item
+from silo_server.services.order_layouts import OrderLayout, export_for
 from silo_server.services.orders import NewOrder, OrderRequest, OrderRow, Recorded
 from silo_server.services.product.export import Export
 from silo_server.services.product.export_files import to_csv, to_xlsx
@@ -271,28 +272,51 @@ def order_csv(
     kind: Kind = orders.BOUGHT,
     supplier: Supplier = None,
     semicolons: bool = False,
+    layout: OrderLayout = OrderLayout.OWN,
 ) -> Response:
-    """Return the parts of one kind as CSV; with ``supplier`` only those from this supplier."""
+    """Return the parts of one kind as CSV; with ``supplier`` only those from this supplier.
+
+    With ``layout`` what is bought has the columns that this program imports.
+    """
     write = partial(to_csv, semicolons=semicolons)
-    return _exported(call, part_number, asked, kind, supplier, write, CSV)
+    return _exported(call, part_number, asked, kind, supplier, write, CSV, layout)
 
 
 @router.get("/items/{part_number}/order.xlsx", response_class=Response, responses=content_of(XLSX))
 def order_xlsx(
-    call: Viewer, part_number: str, asked: AskedFor, kind: Kind = orders.BOUGHT, supplier: Supplier = None
+    call: Viewer,
+    part_number: str,
+    asked: AskedFor,
+    kind: Kind = orders.BOUGHT,
+    supplier: Supplier = None,
+    layout: OrderLayout = OrderLayout.OWN,
 ) -> Response:
-    """Return the parts of one kind as a workbook; with ``supplier`` only those from this supplier."""
-    return _exported(call, part_number, asked, kind, supplier, to_xlsx, XLSX)
+    """Return the parts of one kind as a workbook; with ``supplier`` only those from this supplier.
+
+    ``layout`` as for CSV.
+    """
+    return _exported(call, part_number, asked, kind, supplier, to_xlsx, XLSX, layout)
 
 
 def _exported(
-    call: Call, part_number: str, asked: OrderRequest, kind: str, supplier: str | None, write: Any, media: str
+    call: Call,
+    part_number: str,
+    asked: OrderRequest,
+    kind: str,
+    supplier: str | None,
+    write: Any,
+    media: str,
+    layout: OrderLayout,
 ) -> Response:
     def make(tx: Any) -> Export:
-        return orders.export_orders(orders.order_list(tx, part_number, asked), kind, supplier)
+        order = orders.order_list(tx, part_number, asked)
+        if layout is OrderLayout.OWN:
+            return orders.export_orders(order, kind, supplier)
+        return export_for(order, layout, supplier)
 
     end = "xlsx" if media == XLSX else "csv"
-    name = "".join(c if c.isascii() and c.isalnum() else "_" for c in supplier or kind)
+    of_whom = supplier or (kind if layout is OrderLayout.OWN else layout)
+    name = "".join(c if c.isascii() and c.isalnum() else "_" for c in of_whom)
     return file_of(call, make, write, media, f"order-{name}.{end}")
 
 

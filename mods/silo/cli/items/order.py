@@ -44,7 +44,10 @@ def add_order(parser: argparse.ArgumentParser) -> None:
     add_old_name(parser, "--revision", "--release")
     kinds = ("bought", "made", "unsaid")
     parser.add_argument("--kind", choices=kinds, default="bought", help="only these parts (bought)")
-    only_with(parser, "--csv --xlsx", "--kind", "--supplier")
+    layouts = ("silo", "odoo", "inventree")
+    words = "the columns that this program imports, with what is bought (silo)"
+    parser.add_argument("--layout", choices=layouts, default="silo", help=words)
+    only_with(parser, "--csv --xlsx", "--kind", "--supplier", "--layout")
 
 
 def run_order(args: argparse.Namespace) -> int:
@@ -54,6 +57,7 @@ def run_order(args: argparse.Namespace) -> int:
     asked = {"pieces": args.quantity, "spares": args.spares, "release": args.release, "rest": args.rest}
     given = {name: str(value) for name, value in asked.items() if value}
     table = {"kind": args.kind} | ({"supplier": args.supplier} if args.supplier else {})
+    table |= {"layout": args.layout} if args.layout != "silo" else {}
     with client_of(args) as client:
         number = named_item(client, args.part_number).part_number
         for end, path in (("csv", args.csv), ("xlsx", args.xlsx)):
