@@ -34,6 +34,7 @@ from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import DocumentError, Exit, InputError, RemoteError, SiloError, counted, listed
 from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.items.naming import display_name
+from silo.bom.message import Message, joined, message
 from silo.bom.view.diff_rows import diff_json, diff_rows
 from silo.bom.view.folders import base_folder, project_folder, shorten
 from silo.bom.view.tree_json import entry_json, finding_json
@@ -119,9 +120,9 @@ def sync_top(top: str, extraction: Extraction | SiloError, api: SyncApi, options
         return TopResult(top, error=extraction)
     base = base_folder(extraction)
     if options.skip_parts and not extraction.entries and not extraction.blocked:
-        return TopResult(top, base, skipped="no components of other files: a part, not an assembly")
+        return TopResult(top, base, skipped=message("no components of other files: a part, not an assembly"))
     if options.skip_parts and not extraction.blocked and _is_library(extraction):
-        return TopResult(top, base, skipped="only parts of its own, and no item: a library of parts")
+        return TopResult(top, base, skipped=message("only parts of its own, and no item: a library of parts"))
     try:
         whole = ask_for_moved(resolve(extraction, api), api)
         outcomes = tuple(_outcomes(whole, api, options))
@@ -267,19 +268,19 @@ def outcome_json(outcome: Outcome, base: str) -> dict[str, Any]:
 
 _LEFT = (Status.BLOCKED, Status.UNREGISTERED, Status.FAILED)
 STATUS_WORDS = {
-    Status.MERGED: "BOM merged",
-    Status.UNCHANGED: "no change, nothing was sent",
-    Status.DRY_RUN: "preview only, nothing was sent",
-    Status.BLOCKED: "not synced: links are broken (see below; --allow-missing syncs anyway)",
-    Status.UNREGISTERED: "not synced: the assembly has no Silo part number",
-    Status.FAILED: "not synced",
+    Status.MERGED: message("BOM merged"),
+    Status.UNCHANGED: message("no change, nothing was sent"),
+    Status.DRY_RUN: message("preview only, nothing was sent"),
+    Status.BLOCKED: message("not synced: links are broken (see below; --allow-missing syncs anyway)"),
+    Status.UNREGISTERED: message("not synced: the assembly has no Silo part number"),
+    Status.FAILED: message("not synced"),
 }
 # What changed, by the field of the diff.
 _CHANGES = {
     "added": "added",
     "quantity_changed": "quantity",
-    "conflicts": "a person decides",
-    "removed": "not in the assembly",
+    "conflicts": message("a person decides"),
+    "removed": message("not in the assembly"),
 }
 
 
@@ -433,7 +434,7 @@ class RunSummary:
         several = ((words, files) for lines in (self.errors, self.warnings) for words, files in lines.items())
         return {
             **{words: f"{words}{_others(words, files)}" for words, files in several},
-            **{line: f"{line}: no part number" for line in self._without_number()},
+            **{line: message("{line}: no part number", line=line) for line in self._without_number()},
         }
 
     def new(self) -> list[str] | None:
@@ -471,15 +472,22 @@ class RunSummary:
 
     def sentence(self) -> str:
         """Say in one line how the run went; first what the server kept from being sent."""
-        words = []
+        words: list[str] = []
         for why, count in self.unsent.most_common():
-            words.append(f"{counted(count, 'assembly', 'assemblies')} not sent: {why.rstrip('.')}. ")
-        kept = "".join(words)
-        words = [f"{self.fine} of {self.files} files in order"]
+            words.append(
+                message(
+                    "{count} not sent: {why}. ",
+                    count=counted(count, "assembly", "assemblies"),
+                    why=why.rstrip("."),
+                )
+            )
+        kept = joined("", words)
+        words = [message("{fine} of {files} files in order", fine=self.fine, files=self.files)]
         if self.parts:
-            words.append(f"{self.parts} of them parts")
-        words += [f"{count} {status.replace('_', ' ')}" for status, count in sorted(self.statuses.items())]
-        return f"{kept}{', '.join(words)}."
+            words.append(message("{parts} of them parts", parts=self.parts))
+        for status, count in sorted(self.statuses.items()):
+            words.append(Message(f"{{n}} {status.replace('_', ' ')}", {"n": count}))
+        return kept + joined(", ", words) + "."
 
     def mail(self) -> Iterator[tuple[str, list[str]]]:
         """Yield what fits on one screen: a title, and its lines; a line for each cause, with three examples.
@@ -490,16 +498,20 @@ class RunSummary:
         if self.before is not None:
             new = [_first_ones(cause) for cause in self._by_cause(self._unknown())]
             new += self._numberless(self.before)
-            yield "New since the last run", _most(new or ["nothing"])
+            yield message("New since the last run"), _most(new or ["nothing"])
         yield "Errors", _most(map(_first_ones, self._by_cause(self.errors)))
         yield "Warnings", _most(map(_first_ones, self._by_cause(self._warned(self.before or frozenset()))))
-        yield "Without a part number", self._numberless(frozenset()) if told else []
-        lists = (("Changed", self.changed), ("Not synced", self.held))
+        yield message("Without a part number"), self._numberless(frozenset()) if told else []
+        lists = (("Changed", self.changed), (message("Not synced"), self.held))
         for title, names in lists:
             yield title, [_examples(counted(len(names), "assembly", "assemblies"), names)] if names else []
         moves = [f"{old} → {new}" for _name, old, new in self.moved]
         yield "Moved", [_examples(counted(len(moves), "file"), moves)] if moves else []
-        more = [f"All of it: `{self.page}`" if self.page else "--report FILE.html has all of it"]
+        more = [
+            message("All of it: `{page}`", page=self.page)
+            if self.page
+            else message("--report FILE.html has all of it")
+        ]
         yield "Notes", [*self._notes(), *more]
 
     def sections(self) -> Iterator[tuple[str, list[tuple[str, list[str]]]]]:
@@ -512,10 +524,10 @@ class RunSummary:
         if self.before is not None:
             new = [_whole(cause) for cause in self._by_cause(self._unknown())]
             new += [(line, []) for line in self._numberless(before)]
-            yield "New since the last run", new or [("nothing", [])]
+            yield message("New since the last run"), new or [("nothing", [])]
         yield "Errors", [_whole(cause) for cause in self._by_cause(self.errors)]
         yield "Warnings", [_whole(cause) for cause in self._by_cause(self._warned(before))]
-        title = "Without a part number"
+        title = message("Without a part number")
         yield title, [(line, []) for line in (*self._without_number(), *self._numberless(frozenset())[:1])]
         yield "Moved", [(f"{name}: {old} → {new}", []) for name, old, new in self.moved]
         yield "Notes", [(note, []) for note in self._notes()]
@@ -524,10 +536,14 @@ class RunSummary:
         notes = list(self.notes)
         if old := len(self.warnings) - len(self._warned(self.before or frozenset())):
             command = proposed("bom", Path(self.base or "."), "--verbose")
-            notes.append(f"Hints that were there before: {old} ({command} shows them).")
+            notes.append(
+                message(
+                    "Hints that were there before: {old} ({command} shows them).", old=old, command=command
+                )
+            )
         if self.seconds:
             times = ", ".join(f"{stage} {seconds:.1f} s" for stage, seconds in self.seconds.items())
-            notes.append(f"Time: {times}.")
+            notes.append(message("Time: {times}.", times=times))
         return notes
 
     def _unknown(self) -> list[str]:
@@ -545,7 +561,11 @@ class RunSummary:
         lines = [line for line in self._without_number() if line not in before]
         if not lines:
             return []
-        command = f"; {proposed('register', Path(self.base))} gives them one" if self.base else ""
+        command = (
+            message("; {base} gives them one", base=proposed("register", Path(self.base)))
+            if self.base
+            else ""
+        )
         return [f"{_examples(counted(len(lines), 'part'), lines)}{command}"]
 
     def _by_cause(self, sentences: Iterable[str]) -> list[FaultCause]:
@@ -583,7 +603,7 @@ def _first_ones(cause: FaultCause) -> str:
 
 
 def _more_places(others: Sequence[str]) -> str:
-    return f" ({counted(len(others), 'more place')})" if others else ""
+    return message(" ({others})", others=counted(len(others), "more place")) if others else ""
 
 
 def _whole(cause: FaultCause) -> tuple[str, list[str]]:
@@ -598,14 +618,18 @@ def _whole(cause: FaultCause) -> tuple[str, list[str]]:
 
 
 def _examples(head: str, names: Sequence[str]) -> str:
-    return f"{head}: {listed(names, _EXAMPLES)}"
+    return message("{head}: {examples}", head=head, examples=listed(names, _EXAMPLES))
 
 
 def _most(lines: Iterable[str]) -> list[str]:
     """Cut a list of lines, and say how many there are more."""
     every = list(lines)
     rest = len(every) - _MOST_CAUSES
-    return [*every[:_MOST_CAUSES], f"… and {counted(rest, 'more cause')}"] if rest > 1 else every
+    return (
+        [*every[:_MOST_CAUSES], message("… and {rest}", rest=counted(rest, "more cause"))]
+        if rest > 1
+        else every
+    )
 
 
 class Form(Protocol):
@@ -689,7 +713,9 @@ class ReportFile:
             self._file = None
 
     def _give_up(self, error: OSError) -> None:
-        self.trouble = f"{self.path} could not be written to its end: {error.strerror or error}"
+        self.trouble = message(
+            "{path} could not be written to its end: {error}", path=self.path, error=error.strerror or error
+        )
 
 
 def _bytes(text: str) -> bytes:
@@ -701,8 +727,8 @@ def form_of(path: str) -> Form:
     forms: dict[str, Form] = {".md": Markdown(), ".html": Html(), ".json": Json(), ".xml": JUnit()}
     ending = Path(path).suffix.lower()
     if ending not in forms:
-        kinds = "Markdown (.md), HTML (.html), JSON (.json) or JUnit XML (.xml)"
-        raise InputError(f"{path}: a report is {kinds}")
+        kinds = message("Markdown (.md), HTML (.html), JSON (.json) or JUnit XML (.xml)")
+        raise InputError(message("{path}: a report is {kinds}", path=path, kinds=kinds))
     return forms[ending]
 
 
@@ -734,18 +760,27 @@ def _changes(outcome: Outcome, base: str) -> tuple[str, str, list[tuple[str, ...
         if kind in _CHANGES
     ]
     reasons = [shorten(reason, base) for reason in reasons_of(outcome)]
-    return f"{_name_of(outcome)}: {STATUS_WORDS[outcome.status]}", shorten(head.doc_path, base), rows, reasons
+    return (
+        message("{outcome}: {status}", outcome=_name_of(outcome), status=STATUS_WORDS[outcome.status]),
+        shorten(head.doc_path, base),
+        rows,
+        reasons,
+    )
 
 
-_HEADINGS = ("", "Part number", "Name", "Quantity")
-_NOT_ENDED = "The run has not ended, or was stopped here."
+_HEADINGS = ("", message("Part number"), "Name", "Quantity")
+_NOT_ENDED = message("The run has not ended, or was stopped here.")
 
 
 class Markdown(Form):
     """A mail of one screen. A run in which few assemblies changed has their lines too."""
 
     def head(self, summary: RunSummary | None) -> str:
-        lines = ["# BOM sync", "", *([sentence_cell(summary.sentence()), ""] if summary is not None else [])]
+        lines = [
+            message("# BOM sync"),
+            "",
+            *([sentence_cell(summary.sentence()), ""] if summary is not None else []),
+        ]
         for title, lines_below in summary.mail() if summary is not None else ():
             if lines_below:
                 lines += [f"## {cell(title)}", "", *(f"- {sentence_cell(line)}" for line in lines_below), ""]
@@ -774,7 +809,7 @@ class Markdown(Form):
     def end(self, summary: RunSummary | None) -> str:
         if summary is None:
             return f"\n*{_NOT_ENDED}*\n"
-        return "\nNothing else changed.\n" if _few(summary) else ""
+        return message("\nNothing else changed.\n") if _few(summary) else ""
 
 
 _FEW = 3
@@ -823,7 +858,10 @@ class Html(Form):
         return "\n".join([*parts, *([_list([(reason, []) for reason in reasons])] if reasons else []), ""])
 
     def end(self, summary: RunSummary | None) -> str:
-        return _element("p", _NOT_ENDED if summary is None else "Nothing else changed.") + "</body></html>\n"
+        return (
+            _element("p", _NOT_ENDED if summary is None else message("Nothing else changed."))
+            + "</body></html>\n"
+        )
 
 
 def _element(tag: str, text: str) -> str:
@@ -841,7 +879,7 @@ def _list(sections: Iterable[tuple[str, Sequence[str]]]) -> str:
 def _others(words: str, files: Iterable[str]) -> str:
     """Return the files that a sentence does not name itself, in brackets."""
     named = [file for file in files if file and os.path.basename(file) not in words]
-    return f" ({listed(named)})" if named else ""
+    return message(" ({named})", named=listed(named)) if named else ""
 
 
 def reasons_of(outcome: Outcome) -> list[str]:
@@ -849,7 +887,9 @@ def reasons_of(outcome: Outcome) -> list[str]:
     if outcome.error is not None:
         return [str(outcome.error)]
     if outcome.status is Status.UNREGISTERED:
-        return [f"{proposed('register', Path(outcome.assembly.doc_path))} gives it one"]
+        return [
+            message("{doc_path} gives it one", doc_path=proposed("register", Path(outcome.assembly.doc_path)))
+        ]
     return [finding.message for finding in blocking(outcome.resolved)] if outcome.status in _LEFT else []
 
 
@@ -909,9 +949,11 @@ class JUnit(Form):
         return f"{head}><{kind} message={_attribute(why)}/></testcase>"
 
     def end(self, summary: RunSummary | None) -> str:
-        text = _NOT_ENDED
+        text: str = _NOT_ENDED
         if summary is not None:
-            text = "\n".join([summary.sentence(), *(f"new: {line}" for line in summary.new() or ())])
+            text = "\n".join(
+                [summary.sentence(), *(message("new: {line}", line=line) for line in summary.new() or ())]
+            )
         return f"\n<system-out>{escape(_clean(text))}</system-out>\n</testsuite>\n</testsuites>\n"
 
 

@@ -14,11 +14,13 @@ from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 from typing import IO
 
+from silo.bom.message import message
+
 MODEL = "model"
 ATTACHMENT_KINDS = ("drawing", "step", "data_sheet", "picture", "certificate", "other")
 """Kinds of what lies beside a model, in the order in which they are shown."""
 
-KIND_WORDS = {kind: kind.replace("_", " ") for kind in ATTACHMENT_KINDS} | {"step": "STEP file"}
+KIND_WORDS = {kind: kind.replace("_", " ") for kind in ATTACHMENT_KINDS} | {"step": message("STEP file")}
 
 _MODEL_NAMES = (".fcstd", ".kc")
 _BY_NAME = {

@@ -11,6 +11,7 @@ from itertools import chain
 from pathlib import Path
 
 from silo.bom.errors import ConfigError, InputError
+from silo.bom.message import message
 from silo.platform.spelling import Spelling
 
 IGNORE_FILE = ".siloignore"
@@ -45,9 +46,16 @@ def must_exist(*paths: str) -> None:
     """Raise InputError that names all missing files and folders, before anything is done."""
     lost = [path for path in paths if not os.path.exists(path)]
     if len(lost) == 1:
-        raise InputError(f"{_quoted(lost[0])}: there is no such file or folder")
+        raise InputError(message("{lost}: there is no such file or folder", lost=_quoted(lost[0])))
     if lost:
-        raise InputError(f"{len(lost)} of {len(paths)} files are not there; nothing was done", lost)
+        raise InputError(
+            message(
+                "{count} of {count1} files are not there; nothing was done",
+                count=len(lost),
+                count1=len(paths),
+            ),
+            lost,
+        )
 
 
 def _quoted(path: str) -> str:
@@ -106,7 +114,7 @@ def _patterns(path: str) -> Check:
         from pathspec import GitIgnoreSpec
     except ImportError as error:  # inside FreeCAD
         raise ConfigError(
-            f"{path} is there, but the Python package pathspec, which reads it, is not"
+            message("{path} is there, but the Python package pathspec, which reads it, is not", path=path)
         ) from error
     try:
         # Names need not be valid Unicode, and a pattern with a form feed is one pattern.
@@ -114,7 +122,7 @@ def _patterns(path: str) -> Check:
         lines = [line.removesuffix("\r") for line in text.split("\n")]
         spec = GitIgnoreSpec.from_lines(lines)
     except (OSError, ValueError) as error:
-        raise InputError(f"{path} cannot be read: {error}") from error
+        raise InputError(message("{path} cannot be read: {error}", path=path, error=error)) from error
     return lambda name: spec.check_file(name).include
 
 

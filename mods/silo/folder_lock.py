@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from silo.bom.errors import InputError
+from silo.bom.message import message
 from silo.platform.locks import hold_lock, shows_locks
 from silo.platform.spelling import one_path
 from silo.platform.user_folders import cache_folder
@@ -48,7 +49,7 @@ def folder_lock(
         with suppress(OSError):
             os.chmod(path, 0o666)  # the next one may be another user
         if not shows_locks(path):
-            problem = "its disk shows locks to this computer alone"
+            problem = message("its disk shows locks to this computer alone")
     except FileNotFoundError:  # no such folder: no other program is in it
         yield problem
         return
@@ -91,8 +92,13 @@ def _who() -> str:
     try:
         user = getpass.getuser()
     except (OSError, KeyError):  # a container without a user of this number
-        user = "an unnamed user"
-    return f"process {os.getpid()} of {user} on {socket.gethostname()}"
+        user = message("an unnamed user")
+    return message(
+        "process {getpid} of {user} on {gethostname}",
+        getpid=os.getpid(),
+        user=user,
+        gethostname=socket.gethostname(),
+    )
 
 
 def _held(path: str, folder: str, doing: str, patience: float, tell: Callable[[str], object]) -> BinaryIO:
@@ -100,7 +106,7 @@ def _held(path: str, folder: str, doing: str, patience: float, tell: Callable[[s
     locked.
     """
     if os.path.islink(path):  # somebody else's file may be behind it
-        raise OSError(errno.ELOOP, f"{path} is a symbolic link")
+        raise OSError(errno.ELOOP, message("{path} is a symbolic link", path=path))
     now, deleted = time.monotonic(), 0
     until, due = now + patience, now + 5
     while deleted < _TRIES:
@@ -116,10 +122,15 @@ def _held(path: str, folder: str, doing: str, patience: float, tell: Callable[[s
                 who = Path(path).read_text(encoding="utf-8", errors="replace").strip()
             except OSError:  # the holder has just ended
                 who = ""
-            text = f"{folder} is being {doing} by {who or 'another process'}. Wait for it, or stop it."
+            text = message(
+                "{folder} is being {doing} by {who}. Wait for it, or stop it.",
+                folder=folder,
+                doing=doing,
+                who=who or message("another process"),
+            )
             if now >= until:
                 raise InputError(text)
             tell(text)
             due = now + 60
         time.sleep(0.02 if patience else 0)
-    raise OSError(errno.ESTALE, "its disk returns a different file each time")
+    raise OSError(errno.ESTALE, message("its disk returns a different file each time"))

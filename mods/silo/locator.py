@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from silo.bom.findings import FindingCode
+from silo.bom.message import message
 from silo.platform.device_names import is_device_name
 from silo.platform.spelling import Spelling, Spelt, folded
 
@@ -92,7 +93,7 @@ class Locator:
 
     def _find(self, recorded: str, folders: tuple[str, ...]) -> FoundFile | NotFound:
         if "://" in recorded and _URL.match(recorded):
-            return NotFound(FindingCode.MISSING_FILE, "it is a web address; only files are read")
+            return NotFound(FindingCode.MISSING_FILE, message("it is a web address; only files are read"))
         if (refused := refusal(recorded)) is not None:
             return refused
         outside = False
@@ -124,7 +125,9 @@ class Locator:
                 names = ", ".join(sorted(os.path.basename(match) for match in matches[:4]))
                 return NotFound(
                     FindingCode.MISSING_FILE,
-                    f"several files differ from it in case or Unicode form only: {names}",
+                    message(
+                        "several files differ from it in case or Unicode form only: {names}", names=names
+                    ),
                 )
             if matches and self.inside(real := self.real(matches[0])):
                 return FoundFile(matches[0], real, respelt=True)
@@ -163,16 +166,22 @@ def refusal(recorded: str) -> NotFound | None:
     that a project reads the same everywhere.
     """
     if "\0" in recorded or len(recorded) > _LONGEST:
-        return NotFound(FindingCode.MISSING_FILE, "its path cannot be one")
+        return NotFound(FindingCode.MISSING_FILE, message("its path cannot be one"))
     path = recorded.replace("\\", "/")
     if path.startswith("//"):
         # The mere look would send the user's credentials to that host; //./ and //?/ name devices.
-        return NotFound(FindingCode.OUTSIDE_ROOT, "it is on the network or a device, by an absolute path")
+        return NotFound(
+            FindingCode.OUTSIDE_ROOT, message("it is on the network or a device, by an absolute path")
+        )
     for name in path.split("/"):
         if is_device_name(name):
-            return NotFound(FindingCode.MISSING_FILE, f"{name} is a device on Windows, not a file")
+            return NotFound(
+                FindingCode.MISSING_FILE, message("{name} is a device on Windows, not a file", name=name)
+            )
         if _STREAM.search(name):
-            return NotFound(FindingCode.MISSING_FILE, f"{name} names a stream within a file")
+            return NotFound(
+                FindingCode.MISSING_FILE, message("{name} names a stream within a file", name=name)
+            )
     return None
 
 

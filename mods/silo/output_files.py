@@ -96,7 +96,7 @@ def csv_table(*headings: str) -> OutputForm:
             return False
         return _has_headings(rows, headings)
 
-    return OutputForm("a CSV table", recognises)
+    return OutputForm(message("a CSV table"), recognises)
 
 
 def workbook(*headings: str) -> OutputForm:
@@ -113,14 +113,14 @@ def workbook(*headings: str) -> OutputForm:
             return False
         return any(_has_headings([row.cells for row in grid.rows()], headings) for grid in grids)
 
-    return OutputForm("a workbook", recognises)
+    return OutputForm(message("a workbook"), recognises)
 
 
 # silo.vault.index looks closer at a database.
-INDEX = OutputForm("an index", lambda path: _head(path).startswith(b"SQLite format 3\0"))
+INDEX = OutputForm(message("an index"), lambda path: _head(path).startswith(b"SQLite format 3\0"))
 
 # An output for which each existing file is somebody's work.
-NEW = OutputForm("a new file", lambda _path: False)
+NEW = OutputForm(message("a new file"), lambda _path: False)
 
 
 _JSON_OBJECT = r'^\s*\{{\s*"{first}"'
@@ -128,20 +128,20 @@ _JSON_OBJECT = r'^\s*\{{\s*"{first}"'
 # The reports of silo-mod, by what they are of and by the ending of their names.
 REPORTS = {
     "sync": {
-        ".md": beginning("a report", r"^# BOM sync\r?\n"),
-        ".html": beginning("a report", r"<title>BOM sync</title>"),
-        ".json": beginning("a report", _JSON_OBJECT.format(first="results")),
-        ".xml": beginning("a report", r'<testsuite name="silo-mod sync"'),
+        ".md": beginning(message("a report"), r"^# BOM sync\r?\n"),
+        ".html": beginning(message("a report"), r"<title>BOM sync</title>"),
+        ".json": beginning(message("a report"), _JSON_OBJECT.format(first="results")),
+        ".xml": beginning(message("a report"), r'<testsuite name="silo-mod sync"'),
     },
     "bom-diff": {
-        ".md": beginning("a report", r"^## BOM changes\r?\n"),
-        ".json": beginning("a report", _JSON_OBJECT.format(first="changes")),
+        ".md": beginning(message("a report"), r"^## BOM changes\r?\n"),
+        ".json": beginning(message("a report"), _JSON_OBJECT.format(first="changes")),
     },
     "mass": {
-        ".html": beginning("a report", r"<title>Mass properties</title>"),
-        ".json": beginning("a report", _JSON_OBJECT.format(first="format")),
-        ".csv": beginning("a report", r"^Link,Part,Part number,"),
-        ".md": beginning("a report", r"^# Mass properties of "),
+        ".html": beginning(message("a report"), r"<title>Mass properties</title>"),
+        ".json": beginning(message("a report"), _JSON_OBJECT.format(first="format")),
+        ".csv": beginning(message("a report"), r"^Link,Part,Part number,"),
+        ".md": beginning(message("a report"), message("^# Mass properties of ")),
     },
 }
 

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from silo.bom.errors import DocumentError
+from silo.bom.message import message
 from silo.folder_lock import folder_lock
 from silo.platform.memory_file import read_memory
 from silo.platform.spelling import one_path
@@ -193,4 +194,6 @@ def _note_own(noted: Mapping[str, FileRecord | None]) -> None:
             files |= {place: record for place, record in noted.items() if record is not None}
             _write(path, files, mode=0o600)
     except OSError as error:
-        raise DocumentError(str(path), f"cannot be written ({error.strerror or error})") from error
+        raise DocumentError(
+            str(path), message("cannot be written ({error})", error=error.strerror or error)
+        ) from error

@@ -12,6 +12,7 @@ from enum import StrEnum
 
 from silo.api.wire import MergeDiff, MergeEvent, MergeResult, MergeWarning, ProductSummary, Revision
 from silo.bom.errors import Translate, english
+from silo.bom.message import message
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class ActivityText:
 
     def lines(self) -> tuple[str, ...]:
         """Return all texts of the box, a line each."""
-        link = "View in Silo →" if self.resolve_url else ""
+        link = message("View in Silo →") if self.resolve_url else ""
         return tuple(line for line in (self.headline, self.counts, link, self.unregistered) if line)
 
 
@@ -35,7 +36,7 @@ class MergeCount(StrEnum):
     ADDED = "added"
     CHANGED = "changed"
     UNREFERENCED = "unreferenced"
-    IN_CONFLICT = "in conflict"
+    IN_CONFLICT = message("in conflict")
 
 
 def headline(item: str, translate: Translate = english) -> str:
@@ -87,10 +88,17 @@ def summary_texts(summary: ProductSummary, translate: Translate = english) -> tu
     """Say what is open in each BOM of a product, and what the product weighs and costs, as the server
     has it.
     """
-    texts = [f"{number}: {words}" for number, words in (*summary.open.items(), *summary.incomplete.items())]
-    mass = f"{summary.total_mass_kg:g} kg" if summary.total_mass_kg else ""
+    texts: list[str] = [
+        message("{number}: {words}", number=number, words=words)
+        for number, words in (*summary.open.items(), *summary.incomplete.items())
+    ]
+    mass = (
+        message("{total_mass_kg} kg", total_mass_kg=f"{summary.total_mass_kg:g}")
+        if summary.total_mass_kg
+        else ""
+    )
     costs = ", ".join(f"{total.total_cost:.2f} {total.currency}" for total in summary.totals)
-    values = []
+    values: list[str] = []
     for value, lacking in ((mass, summary.mass_missing), (costs, summary.cost_missing)):
         text = translate("Silo", "{value} for {n} of {all} parts") if lacking.count else "{value}"
         text = text.replace("{n}", str(summary.parts - lacking.count)).replace("{all}", str(summary.parts))
@@ -113,5 +121,5 @@ def activity_text(
         headline=headline(item),
         counts=counts_text(merge.diff, tuple(merge.warnings)),
         resolve_url=resolve_url or merge.resolve_url,
-        unregistered=f"⚠ {without}" if without else "",
+        unregistered=message("⚠ {without}", without=without) if without else "",
     )

@@ -12,12 +12,13 @@ from rich.table import Table
 from rich.text import Text
 from rich.tree import Tree
 
-from silo import spoken
+from silo import caption, spoken
 from silo.bom.compare.bom_diff import BomDiff
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import counted
 from silo.bom.findings import Finding, Severity
 from silo.bom.items.naming import display_name, own_part_name
+from silo.bom.message import message
 from silo.bom.view.diff_rows import diff_rows
 from silo.bom.view.folders import base_folder, shorten
 from silo.bom.view.tree_json import MOST_LINES, check_tree_size
@@ -36,12 +37,12 @@ _MARK = {
 
 # A line of a comparison, by the field of the diff.
 _DIFFERENCE = {
-    "added": ("+", "green", "new in the assembly"),
-    "quantity_changed": ("~", "yellow", "quantity changed"),
-    "conflicts": ("⚡", "magenta", "manual line; a person decides"),
-    "removed": ("⚠", "yellow", "not referenced by the assembly; kept"),
-    "kept": ("?", "red", "its file is missing; the line is kept"),
-    "manual": ("✎", "blue", "manual line; not touched"),
+    "added": ("+", "green", message("new in the assembly")),
+    "quantity_changed": ("~", "yellow", message("quantity changed")),
+    "conflicts": ("⚡", "magenta", message("manual line; a person decides")),
+    "removed": ("⚠", "yellow", message("not referenced by the assembly; kept")),
+    "kept": ("?", "red", message("its file is missing; the line is kept")),
+    "manual": ("✎", "blue", message("manual line; not touched")),
 }
 
 # A tree longer than this does not help on a terminal; a pipe and --json have it all.
@@ -78,7 +79,7 @@ def bom_tree(extraction: Extraction, base: str = "") -> Tree:
     def grow(branch: Tree, entries: Iterable[BomEntry]) -> None:
         for entry in entries:
             if left[0] <= 0:
-                branch.add(Text(spoken("… more; --json has all"), "dim"))
+                branch.add(Text(caption("… more; --json has all"), "dim"))
                 return
             left[0] -= 1
             inner = branch.add(entry_text(entry, base))
@@ -87,7 +88,7 @@ def bom_tree(extraction: Extraction, base: str = "") -> Tree:
 
     def grow_own(branch: Tree, entries: Iterable[BomEntry]) -> None:
         for entry in entries:
-            branch.add(entry_text(entry, base, own=True).append(spoken("  not an item yet"), "yellow"))
+            branch.add(entry_text(entry, base, own=True).append(caption("  not an item yet"), "yellow"))
 
     grow(tree, extraction.entries)
     grow_own(tree, head.own)
@@ -129,9 +130,16 @@ def summary_text(summary: ProductSummary) -> Text:
     texts, values = summary_texts(summary)
     lines = [f"⚠ {plain(text)}" for text in texts]
     rest = len(lines) - MOST_LINES
-    shown = [*lines[:MOST_LINES], f"… and {rest} more"] if rest > 0 else lines or ["✓ nothing is open"]
+    shown = (
+        [*lines[:MOST_LINES], message("… and {rest} more", rest=rest)]
+        if rest > 0
+        else lines or [message("✓ nothing is open")]
+    )
     shown += map(plain, values)
-    return Text("\n").join(Text(spoken(line)) for line in (f"In Silo, {plain(summary.part_number)}:", *shown))
+    return Text("\n").join(
+        Text(spoken(line))
+        for line in (message("In Silo, {part_number}:", part_number=plain(summary.part_number)), *shown)
+    )
 
 
 def diff_table(diff: BomDiff, names: Mapping[str, str], *, whole: bool = True) -> RenderableType:
@@ -148,10 +156,17 @@ def diff_table(diff: BomDiff, names: Mapping[str, str], *, whole: bool = True) -
             Text(mark, style), Text(plain(number), style), name, quantity, Text(spoken(note), "dim")
         )
     if not table.row_count and not whole:
-        text = f"Lines that agree: {len(diff.unchanged)}; the others cannot be compared."
+        text = message("Lines that agree: {count}; the others cannot be compared.", count=len(diff.unchanged))
         return Text(spoken(text), "yellow")
     if not table.row_count:
-        return Text(spoken(f"No differences; lines that agree: {len(diff.unchanged)}."), "green")
+        return Text(
+            spoken(message("No differences; lines that agree: {count}.", count=len(diff.unchanged))), "green"
+        )
     if not diff.unchanged:
         return table
-    return Group(table, Text(spoken(f"{counted(len(diff.unchanged), 'line')} unchanged."), "dim"))
+    return Group(
+        table,
+        Text(
+            spoken(message("{unchanged} unchanged.", unchanged=counted(len(diff.unchanged), "line"))), "dim"
+        ),
+    )

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from silo.bom.entry import Extraction, walk_entries
 from silo.bom.errors import InputError, NotFoundError, RouteMissingError, SiloError, duration
+from silo.bom.message import message
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
@@ -45,7 +46,10 @@ def client_of(
 
     def tell(seconds: float, error: SiloError) -> None:
         if seconds > 5:
-            again = f"It is asked again in {duration(seconds)}; Ctrl-C ends this, what was sent stays"
+            again = message(
+                "It is asked again in {seconds}; Ctrl-C ends this, what was sent stays",
+                seconds=duration(seconds),
+            )
             print(f"silo-mod: {error}. {again}", file=sys.stderr, flush=True)
 
     where = resolve_server(getattr(args, "server", None), getattr(args, "token", None))
@@ -75,7 +79,9 @@ def named_item(client: SiloClient, number: str) -> Item:
     except RouteMissingError:
         raise
     except NotFoundError:
-        raise InputError(f"there is no item {number} on {client.base_url}") from None
+        raise InputError(
+            message("there is no item {number} on {base_url}", number=number, base_url=client.base_url)
+        ) from None
 
 
 def reach(client: SiloClient, extraction: Extraction | None = None) -> None:

@@ -42,29 +42,29 @@ _ASK = (
 
 def shared_options() -> Iterator[SharedOption]:
     """Yield the options that several commands have, in the order of their help."""
-    text = "the assembly to read, where a file holds several"
+    text = message("the assembly to read, where a file holds several")
     yield SharedOption("diff register mass", "--assembly", {"metavar": "NAME", "help": text})
-    text += f"; {EACH!r} for each of them"
+    text += message("; {each} for each of them", each=repr(EACH))
     yield SharedOption("bom sync", "--assembly", {"metavar": "NAME", "help": text})
     servers = "serve backup restore summaries"
     every = f"{_ASK} where-used relink bom-diff {servers} login logout install-addon schema links"
-    open_there = "also files that a running FreeCAD has open; saving them there undoes this"
+    open_there = message("also files that a running FreeCAD has open; saving them there undoes this")
     for commands, option, text in (
-        ("diff sync", "--recursive", "the sub-assemblies too, children before parents"),
-        ("diff bom-diff", "--check", "exit 1 where anything differs, for CI"),
+        ("diff sync", "--recursive", message("the sub-assemblies too, children before parents")),
+        ("diff bom-diff", "--check", message("exit 1 where anything differs, for CI")),
         (
             "bom diff commit sync",
             "--allow-missing",
-            "go on although linked files are missing; their known lines in Silo stay as they are",
+            message("go on although linked files are missing; their known lines in Silo stay as they are"),
         ),
-        ("sync relink", "--dry-run", "show what would change, and change nothing"),
+        ("sync relink", "--dry-run", message("show what would change, and change nothing")),
         ("register relink pull", "--even-if-open", open_there),
         (
             "bom diff register mass sync",
             "--no-hardware",
-            "leave out standard parts (screws, nuts, washers, inserts)",
+            message("leave out standard parts (screws, nuts, washers, inserts)"),
         ),
-        (every, "--json", "print JSON for machines"),
+        (every, "--json", message("print JSON for machines")),
     ):
         yield SharedOption(commands, option, {"action": "store_true", "help": text})
     for commands, forms in (
@@ -72,7 +72,9 @@ def shared_options() -> Iterator[SharedOption]:
         ("inertia mass", ".html .json .csv .md"),
         ("bom-diff", ".md .json"),
     ):
-        text = f"write a report, by its suffix ({forms.replace(' ', ', ')}); may be repeated"
+        text = message(
+            "write a report, by its suffix ({forms}); may be repeated", forms=forms.replace(" ", ", ")
+        )
         how = {"metavar": "FILE", "action": "append", "default": [], "type": _report_in(forms), "help": text}
         yield SharedOption(commands, "--report", how)
     for commands, option, value, default, text in (
@@ -81,43 +83,56 @@ def shared_options() -> Iterator[SharedOption]:
             "--root",
             "FOLDER",
             None,
-            "the project's folder, which is remembered (else found above TOP)",
+            message("the project's folder, which is remembered (else found above TOP)"),
         ),
-        ("where-used", "--root", "FOLDER", ".", "the folder whose files are read (else this one)"),
-        ("pull queue", "--into", "FOLDER", ".", "the folder to write to (else this one)"),
-        ("inertia mass", "--item", "PART_NUMBER", None, "with --push: the item of the whole assembly"),
-        ("watch", "--item", "PART_NUMBER", None, "only events of this item"),
+        ("where-used", "--root", "FOLDER", ".", message("the folder whose files are read (else this one)")),
+        ("pull queue", "--into", "FOLDER", ".", message("the folder to write to (else this one)")),
+        (
+            "inertia mass",
+            "--item",
+            "PART_NUMBER",
+            None,
+            message("with --push: the item of the whole assembly"),
+        ),
+        ("watch", "--item", "PART_NUMBER", None, message("only events of this item")),
         (
             "register doctor",
             "--schema",
             "NAME",
             "kindred-rd",
-            "part number schema (else the server's only one)",
+            message("part number schema (else the server's only one)"),
         ),
     ):
         yield SharedOption(commands, option, {"metavar": value, "default": default, "help": text})
-    limit = {"metavar": "N", "type": above_zero, "default": 20, "help": "at most N, the newest first (20)"}
+    limit = {
+        "metavar": "N",
+        "type": above_zero,
+        "default": 20,
+        "help": message("at most N, the newest first (20)"),
+    }
     yield SharedOption("search log", "--limit", limit)
-    text = "where to remember what files hold (else your cache)"
+    text = message("where to remember what files hold (else your cache)")
     index = {"metavar": "FILE", "type": a_path, "help": text}
     yield SharedOption(f"{_READ} mass", "--index", index, "reading/index")
-    text = "read every file afresh, and remember nothing"
+    text = message("read every file afresh, and remember nothing")
     how = {"action": "store_true", "help": text}
     yield SharedOption(f"{_READ} inertia mass links", "--no-cache", how, "reading/index")
-    text = "processes that read (default: the processors)"
+    text = message("processes that read (default: the processors)")
     yield SharedOption(_READ, "--jobs", {"metavar": "N", "type": job_count, "help": text}, "reading")
-    text = "read on a Dask cluster that sees the same files (extra: dask)"
+    text = message("read on a Dask cluster that sees the same files (extra: dask)")
     yield SharedOption(_READ, "--dask", {"metavar": "ADDRESS", "help": text}, "reading")
-    text = "address of the Silo server (else SILO_API_URL)"
+    text = message("address of the Silo server (else SILO_API_URL)")
     yield SharedOption(_ASK, "--server", {"metavar": "URL", "help": text}, "server")
-    text = "API token (else SILO_API_TOKEN, which other users cannot read)"
+    text = message("API token (else SILO_API_TOKEN, which other users cannot read)")
     yield SharedOption(_ASK, "--token", {"help": text}, "server")
 
 
 def _report_in(forms: str) -> Callable[[str], str]:
     def checked(text: str) -> str:
         if os.path.splitext(text)[1].lower() not in forms.split():
-            raise InputError(f"--report writes {', '.join(forms.split())}; got {text}")
+            raise InputError(
+                message("--report writes {forms}; got {text}", forms=", ".join(forms.split()), text=text)
+            )
         return text
 
     return checked
@@ -139,7 +154,9 @@ def add_shared(parser: argparse.ArgumentParser, command: str) -> None:
 
 def add_top(parser: argparse.ArgumentParser, *alone: str) -> None:
     """Add the assemblies' files or folders."""
-    text = "the assembly's file, or a folder: all assemblies below it; several are read one after the other"
+    text = message(
+        "the assembly's file, or a folder: all assemblies below it; several are read one after the other"
+    )
     add_each(parser, "top", *alone, metavar="TOP", help=text)
 
 
@@ -190,7 +207,7 @@ class _OldName(argparse.Action):
         text = message(
             "{old} is called {new} now; the old name goes with the next release", old=name, new=self.option
         )
-        print(f"silo-mod: {text}", file=sys.stderr)
+        print(message("silo-mod: {text}", text=text), file=sys.stderr)
         setattr(args, self.dest, True if self.nargs == 0 else value)
 
 
@@ -218,19 +235,35 @@ def refuse_idle_options(parser: argparse.ArgumentParser, args: argparse.Namespac
 
     if hasattr(args, "each") and len(several := getattr(args, args.each)) > 1:
         for option in filter(given, args.alone):
-            raise InputError(f"{option} is for one file or item, and {len(several)} are named")
+            raise InputError(
+                message(
+                    "{option} is for one file or item, and {count} are named",
+                    option=option,
+                    count=len(several),
+                )
+            )
     for option, needed in getattr(args, "needs", ()):
         if given(option) and not any(map(given, needed.split())):
-            raise InputError(f"{option} does nothing without {' or '.join(needed.split())}")
+            raise InputError(
+                message(
+                    "{option} does nothing without {needed}",
+                    option=option,
+                    needed=" or ".join(needed.split()),
+                )
+            )
     for option, other in getattr(args, "excludes", ()):
         if given(option) and given(other):
-            raise InputError(f"{option} does nothing with {other}; leave one of them out")
+            raise InputError(
+                message(
+                    "{option} does nothing with {other}; leave one of them out", option=option, other=other
+                )
+            )
 
 
 def a_path(text: str) -> Path:
     """Read an argument that is a path. Refuses an empty one, which would be the current folder."""
     if not text:
-        raise InputError("the name of a file or folder is empty ('')")
+        raise InputError(message("the name of a file or folder is empty ('')"))
     return Path(text)
 
 
@@ -242,5 +275,7 @@ def job_count(text: str) -> int:
 def above_zero(text: str, most: int = 1_000_000_000) -> int:
     """Read a count from an argument: a whole number above 0."""
     if not text.isascii() or not text.isdigit() or not 1 <= int(text[:20]) <= most:
-        raise argparse.ArgumentTypeError(f"{text[:50]!r} is no number from 1 to {most}")
+        raise argparse.ArgumentTypeError(
+            message("{text} is no number from 1 to {most}", text=repr(text[:50]), most=most)
+        )
     return int(text)

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Self
 
 from silo import spoken
+from silo.bom.message import message
 
 if TYPE_CHECKING:
     from silo.outbox.entry import Entry
@@ -50,7 +51,14 @@ class ProgressPrinter:
             if self.step:
                 from silo.cli.terminal import plain
 
-                text = plain(f"silo-mod {self._command}: {spoken(self.step)}, {now - self._begun:.0f} s")
+                text = plain(
+                    message(
+                        "silo-mod {command}: {step}, {begun} s",
+                        command=self._command,
+                        step=spoken(self.step),
+                        begun=f"{now - self._begun:.0f}",
+                    )
+                )
                 print(text, file=sys.stderr, flush=True)
 
 
@@ -76,7 +84,13 @@ def set_step(step: str) -> None:
 
 def set_sending_step(entry: Entry, done: int, total: int) -> None:
     """Set that a file of the queue is being sent; both counts in bytes."""
-    set_step(f"sending {entry.label or entry.file_name}, {done * 100 // max(total, 1)} %")
+    set_step(
+        message(
+            "sending {file_name}, {total} %",
+            file_name=entry.label or entry.file_name,
+            total=done * 100 // max(total, 1),
+        )
+    )
 
 
 def count_steps(count: int) -> Callable[[str], None]:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from silo.bom.entry import Extraction, walk_entries
 from silo.bom.errors import InputError, SeveralAssembliesError, SiloError
 from silo.bom.findings import respelt_findings
+from silo.bom.message import message
 from silo.bom.walk.links import extract
 from silo.bom.walk.roots import choose_assembly
 from silo.cli.options import EACH
@@ -90,7 +91,7 @@ def plan_of(args: argparse.Namespace) -> Iterator[tuple[Plan, VaultReader, str]]
     base = os.path.realpath(args.top)
     tops = documents_in([args.top])
     if not tops:
-        raise InputError(f"no FreeCAD files (*.FCStd) in {args.top}")
+        raise InputError(message("no FreeCAD files (*.FCStd) in {top}", top=args.top))
     with reading_of(args) as reading:
         reading.index.expect(base)
         plan = make_plan(tops, reading, hardware=not args.no_hardware, progress=count_steps(len(tops)))
@@ -100,4 +101,6 @@ def plan_of(args: argparse.Namespace) -> Iterator[tuple[Plan, VaultReader, str]]
 def refuse_assembly_of(tops: Sequence[str], assembly: str | None) -> None:
     """Refuse --assembly for a folder: the name picks one of the assemblies of a file."""
     if assembly not in (None, EACH) and any(os.path.isdir(top) for top in tops):
-        raise InputError("--assembly picks an assembly of one file, and this is a folder; name the file")
+        raise InputError(
+            message("--assembly picks an assembly of one file, and this is a folder; name the file")
+        )

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 from rich.panel import Panel
 from rich.text import Text
 
-from silo import spoken
+from silo import caption, spoken
 from silo.bom.items.naming import display_name
+from silo.bom.message import message
 from silo.bom.walk.document import relative
 from silo.cli.terminal import plain
 
@@ -41,11 +42,11 @@ def outcome_text(outcome: Outcome, base: str) -> Text:
     text.append(f": {spoken(STATUS_WORDS[outcome.status])}")
     if outcome.error is not None:
         text.append(f": {plain(spoken(str(outcome.error)))}")
-    text.append(f"  {plain(relative(head.doc_path, base))}", "dim")
+    text.append(message("  {base}", base=plain(relative(head.doc_path, base))), "dim")
     if draft := draft_text(outcome.result):
         text.append(f"\n  {plain(spoken(draft))}", "dim")
-    for message in unusual(outcome.result):
-        text.append(f"\n  ⚠ {plain(spoken(message))}", "yellow")
+    for sentence in unusual(outcome.result):
+        text.append(f"\n  ⚠ {plain(spoken(sentence))}", "yellow")
     return text
 
 
@@ -55,8 +56,11 @@ def activity_box(activity: ActivityText) -> Panel:
     body.append(f"📋 {plain(spoken(activity.headline))}\n", "bold")
     body.append(plain(spoken(activity.counts)))
     if activity.resolve_url:
-        body.append(spoken(f"\n[View in Silo →] {plain(activity.resolve_url)}"), "cyan")
+        body.append(
+            spoken(message("\n[View in Silo →] {resolve_url}", resolve_url=plain(activity.resolve_url))),
+            "cyan",
+        )
     if activity.unregistered:
         body.append(f"\n{plain(spoken(activity.unregistered))}\n", "yellow")
-        body.append(spoken("[Register Parts...]"), "cyan")
+        body.append(caption("[Register Parts...]"), "cyan")
     return Panel(body, title=spoken("Database Activity"), title_align="left", expand=False, padding=(0, 1))

@@ -32,6 +32,7 @@ import numpy as np
 from silo.api.wire import ModelProduct, Stated, Structure, Use
 from silo.bom.errors import CancelledError, ConfigError, DocumentError, InputError, SiloError, counted
 from silo.bom.key import Key
+from silo.bom.message import message
 from silo.bom.text import with_allowed_characters
 from silo.bom.walk.arrays import elements
 from silo.bom.walk.contents import Contents, Contribution, Lost
@@ -231,7 +232,11 @@ class FileWalk(Walk):
 
     def _why(self, obj: Any) -> str:
         is_mesh = derived(obj, "Mesh::Feature")
-        return "it is a mesh, which no BOM counts" if is_mesh else "it has no shape in its file"
+        return (
+            message("it is a mesh, which no BOM counts")
+            if is_mesh
+            else message("it has no shape in its file")
+        )
 
     def _nothing(self, obj: Any, reason: str, name: str = "") -> str:
         key = self._key(obj)
@@ -411,7 +416,7 @@ def _picture(walk: FileWalk, key: str, leaf: Leaf, drawer: Drawer, unpacked: Unp
             else:
                 groups.setdefault(colour, []).append(mesh)
     if lost:
-        problems.append(f"{counted(lost, 'face')} could not be drawn")
+        problems.append(message("{lost} could not be drawn", lost=counted(lost, "face")))
     whole = {colour: joined(meshes) for colour, meshes in groups.items()}
     return Picture(
         {colour: welded(surface.vertices, surface.faces) for colour, surface in whole.items()},
@@ -502,7 +507,7 @@ class NoDrawer:
 
     def faces(self, path: Path, named: str, place: Floats) -> list[Mesh | None]:
         """Refuse to draw: raise DocumentError."""
-        raise DocumentError(named, "is not a shape that can be drawn")
+        raise DocumentError(named, message("is not a shape that can be drawn"))
 
     def simplified(self, mesh: Mesh, error: float, keep_border: bool) -> Mesh:
         """Return the mesh unchanged."""
@@ -510,7 +515,7 @@ class NoDrawer:
 
     def measured(self, shapes: Sequence[Stored], weigh: bool) -> tuple[Box, Measured | None]:
         """Refuse to measure: raise DocumentError."""
-        raise DocumentError(shapes[0][1], "is not a shape that can be measured")
+        raise DocumentError(shapes[0][1], message("is not a shape that can be measured"))
 
 
 class KernelDrawer:
@@ -596,16 +601,16 @@ def send_models(
         return 0, []  # a Silo without models, or one that cannot be reached now
     todo = [(wanted[place], place) for place in sorted(lacking, key=lambda one: str(wanted[one]))]
     sent, problems, left = 0, list[str](), len(todo)
-    at(f"drawing {counted(left, 'file')}")
+    at(message("drawing {left}", left=counted(left, "file")))
     # Our work must not keep FreeCAD's window waiting.
     shapes = todo if command else [place for place in todo if _has_shapes(place[0])]
     bare = ((*place, _drawn_here(*place)) for place in todo if place not in shapes)
     for path, sha256, model in chain(bare, _drawn(shapes, command, cancelled, problems)):
-        at(f"sending models, {counted(left, 'file')} left")
+        at(message("sending models, {left} left", left=counted(left, "file")))
         left -= 1
         try:
             if isinstance(model, str):
-                problems.append(f"{path.name}: no model was made: {model}")
+                problems.append(message("{name}: no model was made: {model}", name=path.name, model=model))
                 continue
             for part, body in zip(("structure", "geometry"), model, strict=True):
                 client.put_model(sha256, part, body)
@@ -613,7 +618,7 @@ def send_models(
         except CancelledError:
             break
         except SiloError as error:
-            problems.append(f"{path.name}: its model was not sent: {error}")
+            problems.append(message("{name}: its model was not sent: {error}", name=path.name, error=error))
     return sent, problems
 
 
@@ -637,7 +642,7 @@ def _drawn_here(path: Path, sha256: str) -> tuple[bytes, bytes] | str:
         return str(getattr(error, "reason", error))
 
 
-CHANGED = "the file has changed since it was committed"
+CHANGED = message("the file has changed since it was committed")
 
 
 def packed(path: Path, drawer: Drawer) -> tuple[bytes, bytes]:
@@ -654,7 +659,13 @@ def _drawn(
     try:
         yield from _by_children(todo, command, cancelled)
     except ConfigError as error:
-        problems.append(f"Silo gets no model, size or mass of {counted(len(todo), 'file')}: {error}")
+        problems.append(
+            message(
+                "Silo gets no model, size or mass of {todo}: {error}",
+                todo=counted(len(todo), "file"),
+                error=error,
+            )
+        )
 
 
 def _by_children(

@@ -19,6 +19,7 @@ from typing import Any
 
 from silo import FREECAD_PACKAGES, OPTIONAL_PACKAGES
 from silo.bom.errors import ConfigError, InputError
+from silo.bom.message import message
 from silo.freecads.run import ask_inside, find_freecadcmd
 from silo.platform.processes import child_options, python_beside
 from silo.platform.whole_files import remove_patiently
@@ -107,7 +108,7 @@ def ask_freecad(freecadcmd: str | None = None, data: Path | None = None) -> Inst
 
 
 def _pip_words(run: subprocess.CompletedProcess[str]) -> str:
-    return next(iter((run.stderr or run.stdout).strip().splitlines()[-1:]), "it said nothing")
+    return next(iter((run.stderr or run.stdout).strip().splitlines()[-1:]), message("it said nothing"))
 
 
 def _run(command: list[str], seconds: float, **more: Any) -> subprocess.CompletedProcess[str]:
@@ -141,8 +142,10 @@ def _any_python() -> str:
         if python and "freecad" not in os.path.basename(python).lower() and _has_pip(python):
             return python
     raise ConfigError(
-        "no Python with pip was found on this computer. Install pip (on Debian and Ubuntu: apt install "
-        "python3-pip), or Python from python.org, then try again"
+        message(
+            "no Python with pip was found on this computer. Install pip (on Debian and "
+            "Ubuntu: apt install python3-pip), or Python from python.org, then try again"
+        )
     )
 
 
@@ -155,16 +158,16 @@ def install_folder(place: Installation, source: Path | None = None, *, copy: boo
     """
     source = source or shipped()
     if not (source / "package.xml").is_file():
-        raise InputError(f"{source} holds no package.xml; install silo-mod again")
+        raise InputError(message("{source} holds no package.xml; install silo-mod again", source=source))
     whole = (source / "mods" / "silo").is_dir()
     copy = copy or not whole
     _remove_old(place)
     target = place.mod
     if target.is_symlink() and target.resolve() == source:
-        return f"{target} leads to this checkout already"
+        return message("{target} leads to this checkout already", target=target)
     if target.exists() or target.is_symlink():
         if not copy or target.is_symlink() or not (target / "package.xml").is_file():
-            raise InputError(f"{target} is there already; move it away, then repeat")
+            raise InputError(message("{target} is there already; move it away, then repeat", target=target))
         shutil.rmtree(target)
     target.parent.mkdir(parents=True, exist_ok=True)
     if copy:
@@ -177,12 +180,12 @@ def install_folder(place: Installation, source: Path | None = None, *, copy: boo
         shutil.copytree(modules, target / "mods" / "silo", ignore=without)
         if (source / "docs").is_dir():
             shutil.copytree(source / "docs", target / "docs", ignore=shutil.ignore_patterns("decisions"))
-        return f"copied to {target}"
+        return message("copied to {target}", target=target)
     try:
         target.symlink_to(source, target_is_directory=True)
     except OSError:  # Windows lets only administrators and developers make links
-        return f"{install_folder(place, source, copy=True)} (this system makes no links)"
-    return f"{target} now leads to this checkout"
+        return message("{copy} (this system makes no links)", copy=install_folder(place, source, copy=True))
+    return message("{target} now leads to this checkout", target=target)
 
 
 def _remove_old(place: Installation) -> None:
@@ -200,7 +203,9 @@ def install_packages(place: Installation) -> str:
     """
     version = "{}.{}".format(*place.python)
     if place.python < (3, 11):
-        raise ConfigError(f"this FreeCAD has Python {version}; the add-on needs 3.11 or newer")
+        raise ConfigError(
+            message("this FreeCAD has Python {version}; the add-on needs 3.11 or newer", version=version)
+        )
     if not place.missing:
         return str(place.packages)
     names = [ALL_PACKAGES[name] for name in place.missing]
@@ -220,11 +225,26 @@ def install_packages(place: Installation) -> str:
     ):  # the list is on the Internet, the packages may be on a server nearby
         run = _run(command, _PIP_SECONDS)
     if run.returncode:
-        raise ConfigError(f"pip could not install {', '.join(names)} for Python {version}: {_pip_words(run)}")
+        raise ConfigError(
+            message(
+                "pip could not install {names} for Python {version}: {run}",
+                names=", ".join(names),
+                version=version,
+                run=_pip_words(run),
+            )
+        )
     missing = ask_freecad(place.command, place.data).missing
     if missing:
-        reasons = "; ".join(f"{name}: {reason}" for name, reason in missing.items())
-        raise ConfigError(f"the packages are in {place.packages}, but FreeCAD cannot import them: {reasons}")
+        reasons = "; ".join(
+            message("{name}: {reason}", name=name, reason=reason) for name, reason in missing.items()
+        )
+        raise ConfigError(
+            message(
+                "the packages are in {packages}, but FreeCAD cannot import them: {reasons}",
+                packages=place.packages,
+                reasons=reasons,
+            )
+        )
     return str(place.packages)
 
 

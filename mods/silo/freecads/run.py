@@ -25,6 +25,7 @@ from typing import IO, Any
 
 from silo.bom.entry import Extraction
 from silo.bom.errors import ConfigError, DocumentError, InputError, SiloError
+from silo.bom.message import message
 from silo.bom.snapshot import from_plain
 from silo.freecads.places import commands, exchange_folder, start
 from silo.platform import processes
@@ -47,15 +48,20 @@ def find_freecadcmd(given: str | None = None, env: Mapping[str, str] = os.enviro
         command = shutil.which(wanted)
         if command is None:
             raise ConfigError(
-                f"{wanted} cannot be run; SILO_FREECADCMD must name FreeCAD's freecadcmd, its AppImage "
-                "or what Flatpak exports (…/flatpak/exports/bin/org.freecad.FreeCAD)"
+                message(
+                    "{wanted} cannot be run; SILO_FREECADCMD must name FreeCAD's freecadcmd, its "
+                    "AppImage or what Flatpak exports (…/flatpak/exports/bin/org.freecad.FreeCAD)",
+                    wanted=wanted,
+                )
             )
         return command
     command = next(commands(env), None)
     if command is None:
         raise ConfigError(
-            "no FreeCAD found: freecadcmd is not on the PATH, nor where FreeCAD is usually installed. "
-            "Install FreeCAD, or set SILO_FREECADCMD to its freecadcmd or AppImage"
+            message(
+                "no FreeCAD found: freecadcmd is not on the PATH, nor where FreeCAD is usually "
+                "installed. Install FreeCAD, or set SILO_FREECADCMD to its freecadcmd or AppImage"
+            )
         )
     return command
 
@@ -81,7 +87,7 @@ def freecad_for(saved_by: tuple[int, ...]) -> tuple[str, str]:
             if versions[-1][0] >= saved_by:
                 break
     version, command = max(versions, key=lambda pair: pair[0]) if versions else ((), find_freecadcmd())
-    return command, ".".join(map(str, version)) or "of an unknown version"
+    return command, ".".join(map(str, version)) or message("of an unknown version")
 
 
 def ask_inside(command: str, script: str, env: Mapping[str, str]) -> Any:
@@ -109,12 +115,21 @@ def ask_inside(command: str, script: str, env: Mapping[str, str]) -> Any:
                     **processes.child_options(),
                 )
         except (OSError, subprocess.TimeoutExpired) as error:
-            raise ConfigError(f"{command} does not answer: {error}") from error
+            raise ConfigError(
+                message("{command} does not answer: {error}", command=command, error=error)
+            ) from error
         try:
             return json.loads(out.read_text(encoding="utf-8"))
         except (OSError, ValueError):
             how, words = _last_words(run.returncode, log)
-            raise ConfigError(f"{command} did not answer: it {how}. It said: {words}") from None
+            raise ConfigError(
+                message(
+                    "{command} did not answer: it {how}. It said: {words}",
+                    command=command,
+                    how=how,
+                    words=words,
+                )
+            ) from None
 
 
 def run_freecad(
@@ -226,7 +241,13 @@ class FreeCADRun:
                 )
         except OSError as error:
             self._folder.cleanup()
-            raise ConfigError(f"{self.freecadcmd} cannot be started: {error.strerror or error}") from error
+            raise ConfigError(
+                message(
+                    "{freecadcmd} cannot be started: {error}",
+                    freecadcmd=self.freecadcmd,
+                    error=error.strerror or error,
+                )
+            ) from error
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -262,10 +283,20 @@ class FreeCADRun:
         begin.
         """
         if self.timed_out:
-            return DocumentError(path, f"FreeCAD did not finish it within {self.timeout_s:g} s")
+            return DocumentError(
+                path,
+                message("FreeCAD did not finish it within {timeout_s} s", timeout_s=f"{self.timeout_s:g}"),
+            )
         if not self.begun:
-            raise ConfigError(f"{self.freecadcmd} did not work: it {self._how}. It said: {self._said}")
-        return DocumentError(path, f"FreeCAD died while it read this file: it {self._how}")
+            raise ConfigError(
+                message(
+                    "{freecadcmd} did not work: it {how}. It said: {said}",
+                    freecadcmd=self.freecadcmd,
+                    how=self._how,
+                    said=self._said,
+                )
+            )
+        return DocumentError(path, message("FreeCAD died while it read this file: it {how}", how=self._how))
 
     def _stop(self) -> None:
         if self._process is not None:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from silo.bom.errors import InputError
+from silo.bom.message import message
 
 Floats = NDArray[np.float64]
 
@@ -16,6 +17,13 @@ def freeze(owner: object, **shapes: tuple[int, ...]) -> None:
     for name, shape in shapes.items():
         array = np.array(getattr(owner, name), dtype=np.float64)
         if array.shape != shape:
-            raise InputError(f"{name}: wanted an array of shape {shape}, got {array.shape}")
+            raise InputError(
+                message(
+                    "{name}: wanted an array of shape {shape}, got {shape2}",
+                    name=name,
+                    shape=shape,
+                    shape2=array.shape,
+                )
+            )
         array.flags.writeable = False
         object.__setattr__(owner, name, array)

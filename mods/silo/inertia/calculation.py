@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from silo.bom.errors import InputError
-from silo.bom.message import Message
+from silo.bom.message import Message, message
 from silo.inertia.assembly import Assembly, Prototype
 from silo.inertia.bom.mass_cell import parse_mass
 from silo.inertia.bom.table import BOMEntry, BomTable
@@ -93,7 +93,7 @@ def calculate_claims(
     report.bom = rows.source
     report.default_density = task.options.default_density
     for warning in rows.warnings:
-        report.add_warning("", warning.name, f"BOM {warning}", warning.code)
+        report.add_warning("", warning.name, message("BOM {warning}", warning=warning), warning.code)
     for problem in assembly.problems:
         report.add_warning("", "", problem.message, problem.code)
     for doubt in doubts:
@@ -134,7 +134,11 @@ def _weights(task: Task, assembly: Assembly, claims: Claims) -> list[tuple[str, 
     for name, text in given.items():
         cell = parse_mass(text, unit="kg")
         if cell.kg is None or not cell.kg > 0:
-            bad.append(f"{name}: wanted a mass above zero such as 1.25 kg, got “{text}”")
+            bad.append(
+                message(
+                    "{name}: wanted a mass above zero such as 1.25 kg, got “{text}”", name=name, text=text
+                )
+            )
         elif name in claims.members:
             of_links.append((name, claims.members[name], cell.kg))
         else:
@@ -162,7 +166,7 @@ def _framed(claims: Claims, task: Task) -> Claims:
     for name in claims.members:
         if name in task.urdf_frames and not claims.frame(name).chosen:
             placement = task.urdf_frames[name]
-            frames[name] = LinkFrame(placement, "link frame of the URDF at joint position zero")
+            frames[name] = LinkFrame(placement, message("link frame of the URDF at joint position zero"))
     return replace(claims, frames=frames)
 
 

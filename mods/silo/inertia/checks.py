@@ -31,10 +31,12 @@ def check_links_of_urdf(report: InertiaReport, urdf: Urdf) -> None:
     """Warn of links whose mass goes nowhere, or whose frame is unknown."""
     for name, link in report.links.items():
         if name not in urdf.names and link.props.mass > 0:
-            words = f"the URDF has no link of this name; its {link.props.mass:.6g} kg go nowhere"
+            words = message(
+                "the URDF has no link of this name; its {mass} kg go nowhere", mass=f"{link.props.mass:.6g}"
+            )
             report.add_warning(name, "", words, MassCode.LINK_NOT_IN_URDF)
         elif name in urdf.loose and not link.frame.chosen:
-            words = (
+            words = message(
                 "no joints lead from it to the URDF's root: its frame is not known, and taken for the root's"
             )
             report.add_warning(name, "", words, MassCode.LINK_LOOSE)
@@ -61,9 +63,12 @@ def check_frames(report: InertiaReport, claims: Claims, task: Task) -> None:
         frame = chosen_frame(name, claims, task.frame)
         distance, angle = apart(frame.placement, task.urdf_frames[name])
         if distance > FRAME_DISTANCE or angle > FRAME_ANGLE:
-            words = (
-                f"the numbers are in another frame ({frame.description}) than the link has by the URDF's "
-                f"joints, {distance * 1e3:.4g} mm and {math.degrees(angle):.3g}° away from it"
+            words = message(
+                "the numbers are in another frame ({description}) than the link has by the "
+                "URDF's joints, {distance} mm and {angle}° away from it",
+                description=frame.description,
+                distance=f"{distance * 1000.0:.4g}",
+                angle=f"{math.degrees(angle):.3g}",
             )
             report.add_warning(name, "", words, MassCode.FRAME_DIFFERS)
 
@@ -85,9 +90,12 @@ def check_far_frames(report: InertiaReport, claims: Claims, task: Task) -> None:
         if written and link.props.mass > 0 and distance > FAR * size:
             far[name] = distance
     if far:
-        words = (
-            f"the frame of {', '.join(far)} lies {max(far.values()):.4g} m from the centre of mass, in an "
-            f"assembly of about {size:.3g} m: are its origins in mm? URDFs and link maps are in m"
+        words = message(
+            "the frame of {far} lies {far1} m from the centre of mass, in an assembly of "
+            "about {size} m: are its origins in mm? URDFs and link maps are in m",
+            far=", ".join(far),
+            far1=f"{max(far.values()):.4g}",
+            size=f"{size:.3g}",
         )
         report.add_warning("", "", words, MassCode.FRAME_FAR)
 
@@ -103,22 +111,27 @@ def check_tensors(report: InertiaReport) -> None:
     """Warn about links that a simulator refuses, or accepts without a word and computes wrongly."""
     for link in report.links.values():
         if TensorProblem.ZERO_MASS in link.problems:
-            words = "the link has no mass; physics engines refuse a moving link without one"
+            words = message("the link has no mass; physics engines refuse a moving link without one")
             report.add_warning(link.name, "", words, MassCode.ZERO_MASS_LINK)
             continue
         for problem in link.problems:
-            words = f"the link's inertia tensor {tensor_words([problem])}"
+            words = message("the link's inertia tensor {problem}", problem=tensor_words([problem]))
             report.add_warning(link.name, "", words, MassCode.BAD_TENSOR)
 
 
 def check_claims(report: InertiaReport, assembly: Assembly, claims: Claims) -> None:
     """Warn about what the link map left open: unclaimed parts, overlaps, patterns without effect."""
     for part in report.unclaimed:
-        many = f"{part.quantity} pieces, " if part.quantity > 1 else ""
+        many = message("{quantity} pieces, ", quantity=part.quantity) if part.quantity > 1 else ""
         report.add_warning(
             "",
             part.name,
-            f"no link claims it ({many}{part.total_mass:.6g} kg, {part.paths[0]}); it is in no link's mass",
+            message(
+                "no link claims it ({many}{total_mass} kg, {paths}); it is in no link's mass",
+                many=many,
+                total_mass=f"{part.total_mass:.6g}",
+                paths=part.paths[0],
+            ),
             MassCode.UNCLAIMED,
         )
     _check_rooted(report, assembly, claims)
@@ -128,11 +141,25 @@ def check_claims(report: InertiaReport, assembly: Assembly, claims: Claims) -> N
         name = assembly.prototypes[instance.prototype].name
         twice.setdefault((owner, other, name), []).append(instance.name)
     for (owner, other, name), paths in twice.items():
-        pieces = f"{paths[0]} and {len(paths) - 1} more of it" if len(paths) > 1 else paths[0]
-        words = f"{pieces}: {owner} has them by the link map, and {other} claims them as well"
+        pieces = (
+            message("{paths} and {count} more of it", paths=paths[0], count=len(paths) - 1)
+            if len(paths) > 1
+            else paths[0]
+        )
+        words = message(
+            "{pieces}: {owner} has them by the link map, and {other} claims them as well",
+            pieces=pieces,
+            owner=owner,
+            other=other,
+        )
         report.add_warning(other, name, words, MassCode.CLAIMED_TWICE)
     for link, pattern in claims.unused:
-        report.add_warning(link, "", f"the pattern “{pattern}” matches nothing", MassCode.PATTERN_UNUSED)
+        report.add_warning(
+            link,
+            "",
+            message("the pattern “{pattern}” matches nothing", pattern=pattern),
+            MassCode.PATTERN_UNUSED,
+        )
 
 
 def _check_rooted(report: InertiaReport, assembly: Assembly, claims: Claims) -> None:
@@ -144,10 +171,13 @@ def _check_rooted(report: InertiaReport, assembly: Assembly, claims: Claims) -> 
     for part in report.links[root].parts:
         paths = [path for path in part.paths if path in alone]
         if paths:
-            many = f"{len(paths)} pieces, " if len(paths) > 1 else ""
-            words = (
-                f"no first-level sub-assembly holds it ({many}{part.mass * len(paths):.6g} kg); it is in the "
-                f"root link {root}. --loose or --links can say otherwise"
+            many = message("{count} pieces, ", count=len(paths)) if len(paths) > 1 else ""
+            words = message(
+                "no first-level sub-assembly holds it ({many}{paths} kg); it is in the root link "
+                "{root}. --loose or --links can say otherwise",
+                many=many,
+                paths=f"{part.mass * len(paths):.6g}",
+                root=root,
             )
             report.add_warning(root, part.name, words, MassCode.IN_ROOT_LINK)
 
@@ -182,14 +212,21 @@ def check_rows(
     """Warn of BOM rows that no part uses, and rows whose quantity is not the number of parts."""
     names = {plain(product.name) for product in (*leaves, *groups)}
     for row in matching.unused:
-        quantity = f", quantity {row.quantity:g}" if row.quantity is not None else ""
-        why = "no part in the geometry has this name"
+        quantity = (
+            message(", quantity {quantity}", quantity=f"{row.quantity:g}") if row.quantity is not None else ""
+        )
+        why = message("no part in the geometry has this name")
         if plain(row.name) in names:
-            why = "all parts of this name belong to other rows"
+            why = message("all parts of this name belong to other rows")
         report.add_warning(
             "",
             row.name,
-            f"BOM line {row.line}{quantity}: {why}; its mass is not counted",
+            message(
+                "BOM line {line}{quantity}: {why}; its mass is not counted",
+                line=row.line,
+                quantity=quantity,
+                why=why,
+            ),
             MassCode.ROW_UNUSED,
             unused_kg(table, row),
         )
@@ -206,8 +243,13 @@ def check_rows(
             report.add_warning(
                 "",
                 product.name,
-                f"the BOM has {said} of it (line {rows.row.line}), the geometry {count}; "
-                "the geometry's pieces were counted",
+                message(
+                    "the BOM has {said} of it (line {line}), the geometry {count}; the geometry's "
+                    "pieces were counted",
+                    said=said,
+                    line=rows.row.line,
+                    count=count,
+                ),
                 MassCode.COUNT_DIFFERS,
                 min(abs(quantity - count) for quantity in wanted) * (rows.row.mass_kg or 0.0) or None,
             )

@@ -22,6 +22,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from silo.bom.message import message
 from silo.inertia.arrays import Floats
 from silo.inertia.assembly import Assembly, Prototype, placed_below
 from silo.inertia.bom.table import BomCode, BOMEntry
@@ -121,7 +122,9 @@ class MassRule:
     def decide_by_sub_assembly(self, prototype: Prototype, match: Match) -> MassDecision:
         """Do what :meth:`decide` does, by the row of a sub-assembly around the part, which gives no mass."""
         base = self._base(match, Rule.SUB_ASSEMBLY)
-        return self._without_mass(base, prototype, match.row.material, f" to “{match.row.name}” around it")
+        return self._without_mass(
+            base, prototype, match.row.material, message(" to “{name}” around it", name=match.row.name)
+        )
 
     def _without_mass(
         self, base: MassDecision, prototype: Prototype, material: str | None, to: str = ""
@@ -180,16 +183,32 @@ class MassRule:
             name, spread = material.name, material.spread
             notes += density_doubts(prototype, material)
             if answer.doubt:
-                words = f"'{text}' was taken for {name} ({density:g} kg/m³): {answer.doubt}"
+                words = message(
+                    "'{text}' was taken for {name} ({density} kg/m³): {doubt}",
+                    text=text,
+                    name=name,
+                    density=f"{density:g}",
+                    doubt=answer.doubt,
+                )
                 notes.append(Note(MassCode.GUESSED_MATERIAL, words))
         else:
             if self.options.step_density and prototype.step_density is not None:
-                kind, density, where = Source.STEP_DENSITY, prototype.step_density, "the geometry file"
-                used = f"the density in the file ({density:g} kg/m³) was used"
+                kind, density, where = (
+                    Source.STEP_DENSITY,
+                    prototype.step_density,
+                    message("the geometry file"),
+                )
+                used = message("the density in the file ({density} kg/m³) was used", density=f"{density:g}")
             else:
                 kind, density, where = Source.DEFAULT_DENSITY, self.options.default_density, "default"
-                used = f"the default density ({density:g} kg/m³) was used"
-            words = f"Unknown material '{text}'{to and ', assigned' + to}: {answer.advice}; {used}"
+                used = message("the default density ({density} kg/m³) was used", density=f"{density:g}")
+            words = message(
+                "Unknown material '{text}'{to}: {advice}; {used}",
+                text=text,
+                to=to and ", assigned" + to,
+                advice=answer.advice,
+                used=used,
+            )
             notes.append(Note(MassCode.UNKNOWN_MATERIAL, words))
         if not prototype.volume_m3:
             notes.append(_no_volume(prototype))
@@ -208,14 +227,23 @@ class MassRule:
         if self.options.step_density and prototype.step_density is not None:
             note = Note(
                 MassCode.NO_MASS_NO_MATERIAL,
-                f"No mass or material assigned{to} in the BOM; "
-                f"the density in the file ({prototype.step_density:g} kg/m³) was used",
+                message(
+                    "No mass or material assigned{to} in the BOM; the density in the file "
+                    "({step_density} kg/m³) was used",
+                    to=to,
+                    step_density=f"{prototype.step_density:g}",
+                ),
             )
             return self._from_file(base, prototype, (*base.notes, note))
         hint = ""
         if prototype.step_density is not None:
-            hint = f" (the file states {prototype.step_density:g} kg/m³)"
-        note = Note(MassCode.NO_MASS_NO_MATERIAL, f"No mass or material assigned{to}: counted as 0 kg{hint}")
+            hint = message(
+                " (the file states {step_density} kg/m³)", step_density=f"{prototype.step_density:g}"
+            )
+        note = Note(
+            MassCode.NO_MASS_NO_MATERIAL,
+            message("No mass or material assigned{to}: counted as 0 kg{hint}", to=to, hint=hint),
+        )
         return replace(base, source=Source.ZERO, mass_kg=0.0, notes=(*base.notes, note))
 
     def _without_row(self, prototype: Prototype) -> MassDecision:
@@ -261,13 +289,20 @@ def two_ways(row: BOMEntry) -> tuple[Note, ...]:
     """Warn of a mass whose decimal mark had to be guessed."""
     if not row.unsure:
         return ()
-    words = f"its mass in BOM line {row.line} can be read two ways; {row.mass_kg:.6g} kg was used"
+    words = message(
+        "its mass in BOM line {line} can be read two ways; {mass_kg} kg was used",
+        line=row.line,
+        mass_kg=f"{row.mass_kg:.6g}",
+    )
     return (Note(BomCode.AMBIGUOUS_MASS, words),)
 
 
 def _no_volume(prototype: Prototype) -> Note:
-    kind = "no solid" if not prototype.has_solid else "no volume"
-    return Note(MassCode.NO_VOLUME, f"the part has {kind} to multiply a density with: counted as 0 kg")
+    kind = message("no solid") if not prototype.has_solid else message("no volume")
+    return Note(
+        MassCode.NO_VOLUME,
+        message("the part has {kind} to multiply a density with: counted as 0 kg", kind=kind),
+    )
 
 
 ROUNDING_LIMIT = 0.02
@@ -315,9 +350,17 @@ def expectation(prototype: Prototype, text: str | None, material: Material | Non
     if prototype.volume_m3 <= 0:
         return None
     if material is not None:
-        return Expectation(material.density, f"{text} ({material.density:g} kg/m³)", material.spread)
+        return Expectation(
+            material.density,
+            message("{text} ({density} kg/m³)", text=text, density=f"{material.density:g}"),
+            material.spread,
+        )
     stated = prototype.step_density
-    return Expectation(stated, f"the file's {stated:g} kg/m³") if stated is not None else None
+    return (
+        Expectation(stated, message("the file's {stated} kg/m³", stated=f"{stated:g}"))
+        if stated is not None
+        else None
+    )
 
 
 def mass_doubts(given: GivenMass, prototype: Prototype, expected: Expectation | None) -> Iterator[Note]:
@@ -326,7 +369,10 @@ def mass_doubts(given: GivenMass, prototype: Prototype, expected: Expectation | 
     if given.kg > 0 and not prototype.volume_m3:
         yield Note(
             MassCode.POINT_MASS,
-            "there is no solid to spread the BOM's mass over; it was put at one point, without own inertia",
+            message(
+                "there is no solid to spread the BOM's mass over; it was put at one point, "
+                "without own inertia"
+            ),
         )
         return
     contradicted = list(_against(given, prototype.volume_m3, expected)) if expected is not None else []
@@ -340,13 +386,21 @@ def _rounding(given: GivenMass) -> Iterator[Note]:
     if mass == 0:
         yield Note(
             MassCode.ZERO_MASS,
-            f"the BOM says 0 kg (± {quantum:.3g} kg): "
-            "the part is lighter than the BOM shows, or its mass was set to 0",
+            message(
+                "the BOM says 0 kg (± {quantum} kg): the part is lighter than the BOM shows, or "
+                "its mass was set to 0",
+                quantum=f"{quantum:.3g}",
+            ),
         )
     elif quantum > ROUNDING_LIMIT * mass:
         yield Note(
             MassCode.ROUNDED,
-            f"the BOM's {mass:.6g} kg is rounded to ± {quantum:.3g} kg ({quantum / mass:.0%})",
+            message(
+                "the BOM's {mass} kg is rounded to ± {quantum} kg ({mass2})",
+                mass=f"{mass:.6g}",
+                quantum=f"{quantum:.3g}",
+                mass2=f"{quantum / mass:.0%}",
+            ),
             quantum,
         )
 
@@ -354,14 +408,27 @@ def _rounding(given: GivenMass) -> Iterator[Note]:
 def zero_doubt(given: GivenMass, volume: float, density: float, material: str) -> Note:
     """Warn of a BOM mass of 0 kg for a part whose material is known; the material's mass is used."""
     weight = density * volume
-    used = f"{material} times the volume gives {weight:.6g} kg, which was used"
+    used = message(
+        "{material} times the volume gives {weight} kg, which was used",
+        material=material,
+        weight=f"{weight:.6g}",
+    )
     if weight <= given.quantum:
         return Note(
-            MassCode.ZERO_MASS, f"the BOM says 0 kg, for it shows ± {given.quantum:.3g} kg only; {used}"
+            MassCode.ZERO_MASS,
+            message(
+                "the BOM says 0 kg, for it shows ± {quantum} kg only; {used}",
+                quantum=f"{given.quantum:.3g}",
+                used=used,
+            ),
         )
     code = MassCode.ZERO_MASS if given.quantum >= LIGHTEST * volume else MassCode.IMPLAUSIBLE
-    words = f"the BOM says 0 kg (± {given.quantum:.3g} kg), but {used}. Was the mass set to zero? "
-    return Note(code, words + "A mass that is marked as set by hand (“0 kg*”) is kept")
+    words = message(
+        "the BOM says 0 kg (± {quantum} kg), but {used}. Was the mass set to zero? ",
+        quantum=f"{given.quantum:.3g}",
+        used=used,
+    )
+    return Note(code, words + message("A mass that is marked as set by hand (“0 kg*”) is kept"))
 
 
 def _against(given: GivenMass, volume: float, expected: Expectation) -> Iterator[Note]:
@@ -373,15 +440,27 @@ def _against(given: GivenMass, volume: float, expected: Expectation) -> Iterator
     if pieces is not None:
         yield Note(
             MassCode.ROW_TOTAL,
-            f"the BOM's {given.kg:.6g} kg is {pieces:g} times what {expected.words} gives ({weight:.6g} kg), "
-            "and the quantity is the same: this looks like the mass of the whole row. "
-            "It was used as that of one piece",
+            message(
+                "the BOM's {kg} kg is {pieces} times what {words} gives ({weight} kg), and the "
+                "quantity is the same: this looks like the mass of the whole row. It was used as "
+                "that of one piece",
+                kg=f"{given.kg:.6g}",
+                pieces=f"{pieces:g}",
+                words=expected.words,
+                weight=f"{weight:.6g}",
+            ),
         )
         return
     yield Note(
         MassCode.DIFFERS,
-        f"the BOM says {given.kg:.6g} kg, but {expected.words} times the volume gives {weight:.6g} kg "
-        f"({weight / given.kg - 1:+.0%}); the BOM's mass was used",
+        message(
+            "the BOM says {kg} kg, but {words} times the volume gives {weight} kg ({kg3}); "
+            "the BOM's mass was used",
+            kg=f"{given.kg:.6g}",
+            words=expected.words,
+            weight=f"{weight:.6g}",
+            kg3=f"{weight / given.kg - 1:+.0%}",
+        ),
         abs(weight - given.kg),
     )
 
@@ -397,12 +476,23 @@ def implausible(given: GivenMass, volume: float) -> Iterator[Note]:
     if most >= LIGHTEST_PART and least <= DENSEST:
         return
     dense = least > DENSEST
-    than, shape = ("denser than any metal", "shell") if dense else ("lighter than any solid", "envelope")
+    than, shape = (
+        (message("denser than any metal"), "shell")
+        if dense
+        else (message("lighter than any solid"), "envelope")
+    )
     yield Note(
         MassCode.IMPLAUSIBLE,
-        f"the BOM's {given.kg:.6g} kg in {volume * 1e6:.4g} cm³ would be {given.kg / volume:.3g} kg/m³, "
-        f"{than}: is the unit, the decimal mark or the row wrong, or the shape a mere {shape} of the part? "
-        "The BOM's mass was used",
+        message(
+            "the BOM's {kg} kg in {volume} cm³ would be {volume2} kg/m³, {than}: is the "
+            "unit, the decimal mark or the row wrong, or the shape a mere {shape} of the "
+            "part? The BOM's mass was used",
+            kg=f"{given.kg:.6g}",
+            volume=f"{volume * 1000000.0:.4g}",
+            volume2=f"{given.kg / volume:.3g}",
+            than=than,
+            shape=shape,
+        ),
     )
 
 
@@ -419,8 +509,11 @@ def looks_like_totals(masses: Iterable[tuple[bool, float, bool]]) -> bool:
 
 TOTAL_BY_OTHERS = Note(
     MassCode.ROW_TOTAL,
-    "other masses of this BOM look like those of whole rows, and this one, of a row of several pieces, "
-    "cannot be checked: no density is known for it. It was used as that of one piece",
+    message(
+        "other masses of this BOM look like those of whole rows, and this one, of a row "
+        "of several pieces, cannot be checked: no density is known for it. It was used "
+        "as that of one piece"
+    ),
 )
 
 
@@ -433,16 +526,33 @@ def density_doubts(prototype: Prototype, used: Material) -> Iterator[Note]:
         low, high = density * (1 - used.spread), density * (1 + used.spread)
         yield Note(
             MassCode.DENSITY_VARIES,
-            f"{used.name} has from {low:.4g} to {high:.4g} kg/m³, by its kind; {density:g} kg/m³ were used, "
-            f"so the mass is ± {used.spread:.0%}",
+            message(
+                "{name} has from {low} to {high} kg/m³, by its kind; {density} kg/m³ were used, "
+                "so the mass is ± {spread}",
+                name=used.name,
+                low=f"{low:.4g}",
+                high=f"{high:.4g}",
+                density=f"{density:g}",
+                spread=f"{used.spread:.0%}",
+            ),
             used.spread * density * prototype.volume_m3,
         )
     if stated is not None and abs(stated - density) > max(MISMATCH_LIMIT, used.spread) * density:
-        material = f" ({prototype.step_material})" if prototype.step_material else ""
+        material = (
+            message(" ({step_material})", step_material=prototype.step_material)
+            if prototype.step_material
+            else ""
+        )
         yield Note(
             MassCode.STEP_DENSITY,
-            f"the file states {stated:g} kg/m³{material}, "
-            f"{used.name} has {density:g} kg/m³; the BOM's material was used",
+            message(
+                "the file states {stated} kg/m³{material}, {name} has {density} kg/m³; the BOM's "
+                "material was used",
+                stated=f"{stated:g}",
+                material=material,
+                name=used.name,
+                density=f"{density:g}",
+            ),
             abs(stated - density) * prototype.volume_m3,
         )
 
@@ -530,13 +640,13 @@ class Groups:
         if not solid:
             weights = np.ones(len(gaps))
         self.mass[gaps] = mass * weights / weights.sum()
-        what = f"{row.mass_kg:.6g} kg for “{row.name}” around it"
+        what = message("{mass_kg} kg for “{name}” around it", mass_kg=f"{row.mass_kg:.6g}", name=row.name)
         if partly:
-            what += f", of which its other parts leave {mass:.6g} kg"
+            what += message(", of which its other parts leave {mass} kg", mass=f"{mass:.6g}")
         note = Note(
             MassCode.SUB_ASSEMBLY_SHARED,
-            f"the BOM has no data for it, but {what}; that was spread "
-            + ("by volume" if solid else "evenly, as points, since there is no solid"),
+            message("the BOM has no data for it, but {what}; that was spread ", what=what)
+            + (message("by volume") if solid else message("evenly, as points, since there is no solid")),
         )
         volume = float(self.volume[gaps].sum())
         doubts = tuple(implausible(GivenMass(mass, row.quantum_kg), volume)) if solid else ()
@@ -562,7 +672,9 @@ class Groups:
         total = float(self.mass[below].sum())
         left = stated - (total - float(self.mass[rest].sum()))
         if not rest or left <= EXACT * stated:
-            return self._compare(match, below, below[0], row.quantum_kg, "were weighed, too, and were used")
+            return self._compare(
+                match, below, below[0], row.quantum_kg, message("were weighed, too, and were used")
+            )
         if abs(total - stated) > EXACT * stated:
             weights = next(
                 (w for w in (self.mass[rest], self.volume[rest]) if w.sum() > 0), np.ones(len(rest))
@@ -570,8 +682,13 @@ class Groups:
             self.mass[rest] = left * weights / weights.sum()
             note = Note(
                 MassCode.SUB_ASSEMBLY_SHARED,
-                f"the BOM's {stated:.6g} kg for “{row.name}” around it are marked as set by hand: its parts "
-                f"sum up to {total:.6g} kg, and were scaled to it",
+                message(
+                    "the BOM's {stated} kg for “{name}” around it are marked as set by hand: its "
+                    "parts sum up to {total} kg, and were scaled to it",
+                    stated=f"{stated:.6g}",
+                    name=row.name,
+                    total=f"{total:.6g}",
+                ),
             )
             for index in rest:
                 old = self.decisions[index]
@@ -605,8 +722,13 @@ class Groups:
             return True
         note = Note(
             MassCode.SUB_ASSEMBLY,
-            f"the parts of “{row.name}” sum up to {total:.6g} kg, its own row says {stated:.6g} kg; "
-            f"the parts {why}",
+            message(
+                "the parts of “{name}” sum up to {total} kg, its own row says {stated} kg; the parts {why}",
+                name=row.name,
+                total=f"{total:.6g}",
+                stated=f"{stated:.6g}",
+                why=why,
+            ),
         )
         old = self.decisions[first]
         if note not in old.notes:
@@ -722,11 +844,17 @@ def weighed(placed: Placed, groups: Sequence[tuple[str, Sequence[int], float]]) 
                 rest, left = others, left_for_others
         weights = next((w for w in (mass[rest], placed.volume[rest]) if w.sum() > 0), np.ones(len(rest)))
         if not members or not (left > 0 if rest else abs(left) <= MISMATCH_LIMIT * kg):
-            why = f"its weighed parts sum up to {kg - left:.6g} kg" if members else "nothing is called so"
-            words = f"{name} shall weigh {kg:.6g} kg, but {why}: that was not used"
+            why = (
+                message("its weighed parts sum up to {left} kg", left=f"{kg - left:.6g}")
+                if members
+                else message("nothing is called so")
+            )
+            words = message(
+                "{name} shall weigh {kg} kg, but {why}: that was not used", name=name, kg=f"{kg:.6g}", why=why
+            )
             notes.append(Note(MassCode.TARGET_DIFFERS, words))
             continue
-        words = f"weighed: {name} is {kg:.6g} kg"
+        words = message("weighed: {name} is {kg} kg", name=name, kg=f"{kg:.6g}")
         mass[rest] = left * weights / weights.sum() if rest else []
         made: dict[MassDecision, MassDecision] = {}
         for index in rest:
@@ -770,7 +898,9 @@ def _note_scaling(assembly: Assembly, decisions: dict[str, MassDecision]) -> Non
             continue
         note = Note(
             GeometryCode.SCALED,
-            "some of its placements scale the part; its volume and inertia were scaled with it, "
-            "a BOM mass was not",
+            message(
+                "some of its placements scale the part; its volume and inertia were scaled with "
+                "it, a BOM mass was not"
+            ),
         )
         decisions[key] = replace(decisions[key], notes=(*decisions[key].notes, note))

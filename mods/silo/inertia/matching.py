@@ -18,6 +18,7 @@ from enum import StrEnum
 from itertools import count
 
 from silo.bom.errors import counted, listed
+from silo.bom.message import message
 from silo.inertia.bom.table import BOMEntry, BomTable
 from silo.inertia.codes import Decided, Rule
 from silo.inertia.names import bare, could_be, is_lossy, plain
@@ -234,12 +235,19 @@ class _Contest:
                     changed = True
 
     def _in_order(self) -> None:
-        left = f"{counted(len(self.products), 'part')} and {counted(len(self.bundles), 'row')}"
+        left = message(
+            "{products} and {bundles}",
+            products=counted(len(self.products), "part"),
+            bundles=counted(len(self.bundles), "row"),
+        )
         for product, bundle in list(zip(self.products, self.bundles, strict=False)):
             lines = ", ".join(str(row.line) for row in bundle.rows)
-            doubt = (
-                f"{left} named “{product.name}” cannot be distinguished by parent, quantity or mass; "
-                f"by the order of appearance, this one got line {lines}"
+            doubt = message(
+                "{left} named “{name}” cannot be distinguished by parent, quantity or mass; by "
+                "the order of appearance, this one got line {lines}",
+                left=left,
+                name=product.name,
+                lines=lines,
             )
             self._pair(product, bundle, Decided.ORDER, doubt)
 
@@ -271,9 +279,11 @@ def _with_doubtful_shapes(products: Sequence[Product], matches: dict[str, Match]
         volumes = [product.volume_m3 for product in same]
         if max(volumes) - min(volumes) > 0.01 * max(volumes):
             names = listed(list(dict.fromkeys(f"“{product.name}”" for product in same)), 4)
-            words = (
-                f"{len(same)} different shapes are named {names} and the BOM has one mass for all of them; "
-                "each got it"
+            words = message(
+                "{count} different shapes are named {names} and the BOM has one mass for all of "
+                "them; each got it",
+                count=len(same),
+                names=names,
             )
             for key, match in ((p.key, matches[p.key]) for p in same):
                 matches[key] = replace(match, doubt=match.doubt or words)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from silo.bom.errors import InputError
+from silo.bom.message import message
 from silo.inertia.arrays import Floats
 
 RIGID_TOLERANCE = 1e-6
@@ -72,13 +73,15 @@ def as_placement(value: ArrayLike) -> Floats:
     try:
         matrix = np.asarray(value, float)
     except (TypeError, ValueError) as error:
-        raise InputError(f"a placement is a 4 x 4 matrix of numbers ({error})") from error
+        raise InputError(
+            message("a placement is a 4 x 4 matrix of numbers ({error})", error=error)
+        ) from error
     if matrix.shape != (4, 4):
-        raise InputError(f"a placement is a 4 x 4 matrix, got the shape {matrix.shape}")
+        raise InputError(message("a placement is a 4 x 4 matrix, got the shape {shape}", shape=matrix.shape))
     if not np.isfinite(matrix).all() or not np.allclose(matrix[3], (0, 0, 0, 1), atol=1e-12):
         raise InputError(
             f"a placement needs finite numbers and the last row 0 0 0 1, got {matrix[3].tolist()}"
         )
     if abs(np.linalg.det(matrix[:3, :3])) < 1e-12:
-        raise InputError("a placement must be invertible; this one flattens the part")
+        raise InputError(message("a placement must be invertible; this one flattens the part"))
     return matrix

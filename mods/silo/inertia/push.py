@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from silo.api.policy import ends_run
 from silo.bom.errors import NotFoundError, SiloError
+from silo.bom.message import message
 from silo.inertia.bom.table import BomCode
 from silo.inertia.codes import MassCode, Source
 from silo.inertia.digits import number, rounded
@@ -95,7 +96,7 @@ def plan_push(
     unsure: dict[str, str] = {}
     gaps = 0
     lost = next((str(w.code) for w in report.warnings if w.code in DOUBTS and not w.part_name), "")
-    doubt = f"the whole file is in doubt ({lost}), and so may be this part" if lost else ""
+    doubt = message("the whole file is in doubt ({lost}), and so may be this part", lost=lost) if lost else ""
     for _, part in report.parts():
         gap = doubt or _gap(part)
         gaps += gap is not None
@@ -105,7 +106,7 @@ def plan_push(
             else [number_of[k] for k in part.products if k in number_of]
         )
         if gap is not None or not numbers:
-            push_items.append(Skipped(part.name, gap or "it has no part number"))
+            push_items.append(Skipped(part.name, gap or message("it has no part number")))
             if part.source is not Source.SUB_ASSEMBLY_MASS:
                 unsure |= dict.fromkeys(numbers, part.name)
             continue
@@ -115,10 +116,18 @@ def plan_push(
         values = [_properties(part) for part in parts]
         different = sum(value not in values[:index] for index, value in enumerate(values))
         if part_number in unsure:
-            reason = f"{unsure[part_number]!r} has the part number {part_number} as well, and no sure mass"
+            reason = message(
+                "{part_number} has the part number {part_number1} as well, and no sure mass",
+                part_number=repr(unsure[part_number]),
+                part_number1=part_number,
+            )
             push_items.append(Skipped(parts[0].name, reason))
         elif different > 1:
-            reason = f"{different} different shapes or masses have the part number {part_number}"
+            reason = message(
+                "{different} different shapes or masses have the part number {part_number}",
+                different=different,
+                part_number=part_number,
+            )
             push_items.append(Skipped(parts[0].name, reason))
         else:
             push_items.append(PushItem(part_number, parts[0].name, values[0]))
@@ -127,7 +136,9 @@ def plan_push(
         push_items.append(Skipped(value.name, doubt) if doubt else _sub_assembly(value, taken))
     for warning in report.warnings:
         if warning.code == MassCode.ROW_UNUSED:
-            push_items.append(Skipped(warning.part_name, "no part of the geometry belongs to its row"))
+            push_items.append(
+                Skipped(warning.part_name, message("no part of the geometry belongs to its row"))
+            )
     if top is not None:
         push_items.append(_whole(report, top, gaps))
     items = tuple(value for value in push_items if isinstance(value, PushItem))
@@ -180,31 +191,33 @@ def _write(items: SiloClient, wanted: PushItem, comment: str) -> bool | None:
 
 def _gap(part: PartResult) -> str | None:
     if part.source is Source.SUB_ASSEMBLY_MASS:
-        return "its mass is a share of its sub-assembly's, which is written to that one's item"
+        return message("its mass is a share of its sub-assembly's, which is written to that one's item")
     if part.source is Source.TARGET_MASS:
-        return "its mass is a share of what was weighed, and the scale's reading is of no item"
+        return message("its mass is a share of what was weighed, and the scale's reading is of no item")
     if part.source not in VOUCHED:
-        return "neither BOM nor material gives its mass"
+        return message("neither BOM nor material gives its mass")
     if part.mass <= 0:
-        return "its mass is zero"
+        return message("its mass is zero")
     doubts = [warning for warning in part.warnings if warning.code in DOUBTS]
     if doubts:
-        return f"its mass is in doubt ({', '.join(dict.fromkeys(str(w.code) for w in doubts))})"
+        return message(
+            "its mass is in doubt ({doubts})", doubts=", ".join(dict.fromkeys(str(w.code) for w in doubts))
+        )
     return None
 
 
 def _sub_assembly(result: SubAssemblyResult, taken: Set[str]) -> PushItem | Skipped:
     reason = ""
     if not result.part_number:
-        reason = "it has no part number"
+        reason = message("it has no part number")
     elif result.mass <= 0:
-        reason = "its mass is zero"
+        reason = message("its mass is zero")
     elif not result.agrees:
-        reason = "its parts sum up to another mass than its own row says"
+        reason = message("its parts sum up to another mass than its own row says")
     elif result.doubtful:
-        reason = "its mass is in doubt (see the warnings)"
+        reason = message("its mass is in doubt (see the warnings)")
     elif result.part_number in taken:
-        reason = f"another part has the part number {result.part_number}"
+        reason = message("another part has the part number {part_number}", part_number=result.part_number)
     return (
         Skipped(result.name, reason)
         if reason
@@ -215,7 +228,7 @@ def _sub_assembly(result: SubAssemblyResult, taken: Set[str]) -> PushItem | Skip
 def _whole(report: InertiaReport, top: str, gaps: int) -> PushItem | Skipped:
     total = report.total
     if total is None or total.mass <= 0 or gaps:
-        return Skipped(report.assembly, f"{gaps} of its parts have no sure mass")
+        return Skipped(report.assembly, message("{gaps} of its parts have no sure mass", gaps=gaps))
     com = [rounded(value) for value in total.com]
     return PushItem(top, report.assembly, {"mass_kg": rounded(total.mass), "com_m": com})
 
@@ -232,11 +245,18 @@ def _properties(part: PartResult | SubAssemblyResult) -> dict[str, Any]:
 def _comment(report: InertiaReport) -> str:
     source = report.source.replace("\\", "/").rpartition("/")[2] or report.assembly
     bom = report.bom.replace("\\", "/").rpartition("/")[2]
-    return f"Mass properties from {source}" + (f" and {bom}" if bom else "")
+    return message("Mass properties from {source}", source=source) + (
+        message(" and {bom}", bom=bom) if bom else ""
+    )
 
 
 def describe(item: PushItem) -> str:
     """Describe an item in one line, for people."""
     volume = item.properties.get("volume_m3")
-    text = f"{item.part_number}  {item.name}: {number(item.properties['mass_kg'])} kg"
-    return text + (f", {volume * 1e6:.6g} cm³" if volume else "")
+    text = message(
+        "{part_number}  {name}: {properties} kg",
+        part_number=item.part_number,
+        name=item.name,
+        properties=number(item.properties["mass_kg"]),
+    )
+    return text + (message(", {volume} cm³", volume=f"{volume * 1000000.0:.6g}") if volume else "")

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from silo.bom.errors import InputError
+from silo.bom.message import message
 from silo.inertia.arrays import Floats, freeze
 from silo.inertia.placements import EYE3, as_placement, is_rigid
 from silo.inertia.types import InertialProperties
@@ -38,13 +39,13 @@ class TensorProblem(StrEnum):
 
 
 _TENSOR_WORDS = {
-    TensorProblem.NOT_FINITE: "has a value that is not finite",
-    TensorProblem.NOT_SYMMETRIC: "is not symmetric",
-    TensorProblem.ZERO_MASS: "has no mass",
-    TensorProblem.NEGATIVE_MASS: "has a negative mass",
-    TensorProblem.ZERO_INERTIA: "has no inertia (a point mass); MuJoCo refuses it on a moving link",
-    TensorProblem.NOT_POSITIVE_DEFINITE: "has a principal moment that is not above zero",
-    TensorProblem.TRIANGLE_INEQUALITY: "has a principal moment above the sum of the two others",
+    TensorProblem.NOT_FINITE: message("has a value that is not finite"),
+    TensorProblem.NOT_SYMMETRIC: message("is not symmetric"),
+    TensorProblem.ZERO_MASS: message("has no mass"),
+    TensorProblem.NEGATIVE_MASS: message("has a negative mass"),
+    TensorProblem.ZERO_INERTIA: message("has no inertia (a point mass); MuJoCo refuses it on a moving link"),
+    TensorProblem.NOT_POSITIVE_DEFINITE: message("has a principal moment that is not above zero"),
+    TensorProblem.TRIANGLE_INEQUALITY: message("has a principal moment above the sum of the two others"),
 }
 
 
@@ -122,8 +123,13 @@ class MassProps:
             return NotImplemented
         if self.frame and other.frame and self.frame != other.frame:
             raise InputError(
-                f"these bodies are given in two frames ({self.frame}; {other.frame}) and cannot be added; "
-                "bring one into the other's frame with transformed(T), or ask for all in the assembly's frame"
+                message(
+                    "these bodies are given in two frames ({frame}; {frame1}) and cannot be added; "
+                    "bring one into the other's frame with transformed(T), or ask for all in the "
+                    "assembly's frame",
+                    frame=self.frame,
+                    frame1=other.frame,
+                )
             )
         return replace(combine((self, other)), frame=self.frame or other.frame)
 
@@ -134,7 +140,7 @@ class MassProps:
     def __repr__(self) -> str:
         centre = ", ".join(f"{v:.6g}" for v in self.com)
         finite = np.isfinite(self.inertia).all()
-        moments = ", ".join(f"{v:.6g}" for v in self.principal()[0]) if finite else "not finite"
+        moments = ", ".join(f"{v:.6g}" for v in self.principal()[0]) if finite else message("not finite")
         where = f", frame={self.frame!r}" if self.frame else ""
         return f"MassProps(mass={self.mass:.6g} kg, com=[{centre}] m, principal=[{moments}] kg m²{where})"
 
@@ -147,8 +153,11 @@ class MassProps:
         matrix = as_placement(placement)
         if not is_rigid(matrix):
             raise InputError(
-                "a body with a mass can be moved, turned and mirrored, but not scaled; "
-                f"the placement's axes have the lengths {np.linalg.norm(matrix[:3, :3], axis=0).tolist()}"
+                message(
+                    "a body with a mass can be moved, turned and mirrored, but not scaled; the "
+                    "placement's axes have the lengths {tolist}",
+                    tolist=np.linalg.norm(matrix[:3, :3], axis=0).tolist(),
+                )
             )
         turn = matrix[:3, :3]
         return MassProps(self.mass, turn @ self.com + matrix[:3, 3], turn @ self.inertia @ turn.T, frame)

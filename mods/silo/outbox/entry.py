@@ -28,6 +28,7 @@ from typing import Any
 from uuid import uuid4
 
 from silo.bom.entry import Extraction
+from silo.bom.message import message
 from silo.checksums import seen_as
 from silo.platform.stamp import Stamp
 
@@ -45,7 +46,7 @@ def new_key() -> str:
     return str(uuid4())
 
 
-ASKED, SAME_PART = "asked", "same part"
+ASKED, SAME_PART = "asked", message("same part")
 
 UNKNOWN = "unknown"
 """The origin of a file before anybody has looked."""
@@ -213,6 +214,6 @@ def on_top(comment: str, newer: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of a commit that is sent on top of a newer revision that the user saw."""
     number = newer["revision_number"]
     if not newer.get("set_back"):  # a server that was set back has nothing of a colleague
-        who = f" by {newer['created_by']}" if newer.get("created_by") else ""
+        who = message(" by {newer}", newer=newer["created_by"]) if newer.get("created_by") else ""
         comment = f"{comment} (on top of revision {number}{who}, which is not in it)".strip()
     return {"on_top_of": seen_as(number, newer.get("file_checksum")), "comment": comment}

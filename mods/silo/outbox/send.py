@@ -45,6 +45,7 @@ from silo.bom.errors import (
     RouteMissingError,
     SiloError,
 )
+from silo.bom.message import message
 from silo.bom.snapshot import from_plain
 from silo.bom.view.folders import project_folder
 from silo.bom_sync.held import report_held, why_held
@@ -66,7 +67,7 @@ def went_alone(entry: Entry) -> list[str]:
     if not entry.has_file or entry.file_left == entry.bom_left:
         return []
     there, left = ("BOM", "file") if entry.file_left else ("file", "BOM")
-    return [f"Its {there} is in Silo; only the {left} is not"]
+    return [message("Its {there} is in Silo; only the {left} is not", there=there, left=left)]
 
 
 def send_all(
@@ -296,7 +297,9 @@ class _SendRun:
         try:
             return resolve(from_plain(json.loads(extraction)), self.client)
         except ValueError as error:
-            raise InputError(f"{entry.label}: its BOM cannot be read any more; commit it again") from error
+            raise InputError(
+                message("{label}: its BOM cannot be read any more; commit it again", label=entry.label)
+            ) from error
 
     def _number(self, entry: Entry) -> str:
         """Find the item or document to which the file goes; "" for an attachment of the assembly that needs
@@ -312,13 +315,18 @@ class _SendRun:
         identity = within.items[0][0] if within.own else entry.identity
         if not identity:
             raise InputError(
-                f"{entry.file_name}: it is not known which item it belongs to. Save a copy of it"
+                message(
+                    "{file_name}: it is not known which item it belongs to. Save a copy of it",
+                    file_name=entry.file_name,
+                )
             )
         item: Any = self.client.get_item_by_uuid(identity) if identity else None
         if item is None:
             raise NotFoundError(
-                f"Silo does not know {entry.label or entry.path}; register it, or check that this is the "
-                "right server"
+                message(
+                    "Silo does not know {path}; register it, or check that this is the right server",
+                    path=entry.label or entry.path,
+                )
             )
         return str(item["part_number"])
 
@@ -336,15 +344,18 @@ class _SendRun:
         user: Any = self.client.get_item_by_uuid(InFile.of(entry.document).user)
         if user is None:
             raise NotFoundError(
-                f"{entry.label or entry.path}: this Silo keeps a file without a part number as an attachment "
-                "of the assembly that links to it, and that assembly has none; register it"
+                message(
+                    "{path}: this Silo keeps a file without a part number as an attachment of the "
+                    "assembly that links to it, and that assembly has none; register it",
+                    path=entry.label or entry.path,
+                )
             )
         number = str(user["part_number"])
         self.client.attach_file(number, self._copy(entry), entry.file_name, cancelled=self.cancelled)
         # Such a Silo lists no revisions of it: the record alone keeps the next run from sending it again.
         note_arrived(entry, Revision(revision_number=0, file_checksum=entry.sha256))
         self.store.arrived(entry, "file")
-        text = f"This Silo keeps it as an attachment of {number}, without revisions"
+        text = message("This Silo keeps it as an attachment of {number}, without revisions", number=number)
         return Sent(replace(entry, remark=text), number)
 
     def _send_file(self, sent: Sent) -> Sent:
@@ -433,9 +444,13 @@ class _SendRun:
             is_set_back(newest, record, entry.server) and not was_sent
         ):
             raise NewerRevisionError(
-                f"The server was restored from a backup: it has revision {newest.revision_number} of "
-                f"{entry.part_number}, and this is newer and came after what it has lost. "
-                "Retry all sends it again",
+                message(
+                    "The server was restored from a backup: it has revision {revision_number} of "
+                    "{part_number}, and this is newer and came after what it has lost. Retry all "
+                    "sends it again",
+                    revision_number=newest.revision_number,
+                    part_number=entry.part_number,
+                ),
                 {**newest.model_dump(mode="json", exclude={"properties", "links"}), "set_back": True},
             )
 
@@ -483,15 +498,21 @@ class _SendRun:
         try:
             return self.store.verified(entry)
         except FileNotFoundError as error:
-            text = "the copy kept for sending is gone, so it was not sent. Commit the document again, then "
-            raise InputError(f"{entry.path or entry.file_name}: {text}discard this") from error
+            text = message(
+                "the copy kept for sending is gone, so it was not sent. Commit the document again, then "
+            )
+            raise InputError(
+                message("{file_name}: {text}discard this", file_name=entry.path or entry.file_name, text=text)
+            ) from error
         except OSError as error:
             raise self._unreadable(entry, error.strerror or str(error)) from error
 
     def _unreadable(self, entry: Entry, reason: str) -> _PassingError:
         # This is an error of the disk, not damage: the hash of a damaged copy differs.
-        text = f"the copy kept for sending cannot be read ({reason})"
-        return _PassingError(f"{entry.path or entry.file_name}: {text}")
+        text = message("the copy kept for sending cannot be read ({reason})", reason=reason)
+        return _PassingError(
+            message("{file_name}: {text}", file_name=entry.path or entry.file_name, text=text)
+        )
 
     def _revisions(
         self, part_number: str, *, newest: int | None = None, after: int = 0
@@ -518,9 +539,15 @@ class _SendRun:
         if before and entry.renamed != SAME_PART:
             self.store.update(entry.id, renamed=ASKED)
             raise _OtherNameError(
-                f"{entry.file_name} carries the identity of {entry.part_number}, whose file in Silo is "
-                f"{before}. Is it the same part under a new name? Press Same part. Is it a copy that became "
-                "a new part? Press Discard, then choose Register Parts and in it: new part"
+                message(
+                    "{file_name} carries the identity of {part_number}, whose file in Silo is "
+                    "{before}. Is it the same part under a new name? Press Same part. Is it a copy "
+                    "that became a new part? Press Discard, then choose Register Parts and in it: "
+                    "new part",
+                    file_name=entry.file_name,
+                    part_number=entry.part_number,
+                    before=before,
+                )
             )
 
     def _send_bom(self, sent: Sent, request: str) -> Sent:
@@ -606,7 +633,9 @@ class _SendRun:
         try:
             wanted = MergeRequest.model_validate_json(request)
         except ValidationError as error:
-            raise InputError(f"{entry.label}: its BOM cannot be read any more; commit it again") from error
+            raise InputError(
+                message("{label}: its BOM cannot be read any more; commit it again", label=entry.label)
+            ) from error
         document = wanted.document
         if document is None and entry.path:
             document = SourceDocument(

@@ -34,7 +34,7 @@ from typing import Any, BinaryIO
 from silo.api.address import canonical
 from silo.api.pause import Pause
 from silo.bom.errors import ConflictError, DocumentError, InputError, counted
-from silo.bom.message import Message
+from silo.bom.message import Message, message
 from silo.bom.snapshot import to_plain
 from silo.checksums import content_hash
 from silo.folder_lock import folder_lock
@@ -62,7 +62,7 @@ _REMEMBERED = 2 * 366 * 86400.0
 _LONGEST_LINEAGE = 1000
 _LOOK_FOR_IT = FileRecord("")
 # Stands before the first content of a document that was saved over a file that another program had written.
-_OTHER_FILE = "another file"
+_OTHER_FILE = message("another file")
 # A copy of a file that was replaced is kept for so long, or until the user deletes it.
 KEPT_ASIDE_DAYS = 90
 _NEWEST_DAYS = 3
@@ -148,8 +148,12 @@ class QueueDatabase:
         except (sqlite3.Error, OSError) as error:
             self._is_ready = False  # if it is damaged, the next call makes it again
             raise OutboxError(
-                f"{self.path}: the outbox cannot be used now ({error}). What waits in it is still there. "
-                "Make room on the disk or fix its permissions, then try again"
+                message(
+                    "{path}: the outbox cannot be used now ({error}). What waits in it is still "
+                    "there. Make room on the disk or fix its permissions, then try again",
+                    path=self.path,
+                    error=error,
+                )
             ) from error
 
     def _make_ready(self) -> None:
@@ -168,18 +172,31 @@ class QueueDatabase:
             sync_folder(self.path.parent)
         except OSError as error:
             waiting = len([*self.copies.glob("*.json")])
-            text, again = "Nothing was kept for sending", "commit again"
+            text, again = message("Nothing was kept for sending"), message("commit again")
             if waiting:
-                text, again = f"{counted(waiting, 'commit')} in {self.copies} cannot be sent", "try again"
+                text, again = (
+                    message(
+                        "{waiting} in {copies} cannot be sent",
+                        waiting=counted(waiting, "commit"),
+                        copies=self.copies,
+                    ),
+                    message("try again"),
+                )
             raise _ClosedError(
-                f"{self.path}: the outbox cannot be written ({error.strerror or error}). {text}; make room "
-                f"or fix the permissions, then {again}"
+                message(
+                    "{path}: the outbox cannot be written ({error}). {text}; make room or fix the "
+                    "permissions, then {again}",
+                    path=self.path,
+                    error=error.strerror or error,
+                    text=text,
+                    again=again,
+                )
             ) from error
         with self._translated():
             if not self._is_whole():
                 # Two processes may begin in the same moment.
                 with folder_lock(
-                    str(self.path.parent), f"{self.path.stem}.making", "made ready", _PATIENCE_S
+                    str(self.path.parent), f"{self.path.stem}.making", message("made ready"), _PATIENCE_S
                 ):
                     if not self._is_whole():  # another process was quicker
                         self._make_anew()
@@ -240,7 +257,9 @@ class QueueDatabase:
         try:
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         except OSError as error:
-            raise DocumentError(str(folder), f"cannot be made ({error.strerror or error})") from error
+            raise DocumentError(
+                str(folder), message("cannot be made ({error})", error=error.strerror or error)
+            ) from error
         return folder / f"{time.strftime('%H%M%S')}-{time.monotonic_ns() % 10**6}-{os.path.basename(path)}"
 
     # -- descriptions -----------------------------------------------------------------------------------
@@ -293,7 +312,7 @@ class QueueDatabase:
                     _insert(db, table, before)
         for key in lost.keys() - _keys(db) - gone:  # so that the user sees it
             copy = lost[key]
-            reason = _LOST.format("a copy of its file" if copy else "its name")
+            reason = _LOST.format(message("a copy of its file") if copy else message("its name"))
             row = {"key": key, "state": State.HELD, "path": "", "taken_at": self.clock(), "reason": reason}
             _insert(db, "entry", {**row, "file_name": copy, "copy": copy, "file_left": bool(copy)})
         for key in _keys(db):
@@ -391,7 +410,9 @@ class FileOrigins(QueueDatabase):
         except FileNotFoundError:
             return None
         except OSError as error:
-            text = f"no copy of it could be kept ({error.strerror or error}); it was not replaced"
+            text = message(
+                "no copy of it could be kept ({error}); it was not replaced", error=error.strerror or error
+            )
             raise DocumentError(path, text) from error
         return target
 
@@ -466,7 +487,12 @@ class Store(FileOrigins):
     def stage(self, commit: Commit, server: str = "") -> None:
         """Put a commit's row on disk, which takes no time; the caller then calls :meth:`finish`."""
         if commit.file is None and commit.extraction is None and not commit.request:
-            raise InputError(f"{commit.path or commit.part_number}: neither a file nor a BOM to keep")
+            raise InputError(
+                message(
+                    "{part_number}: neither a file nor a BOM to keep",
+                    part_number=commit.path or commit.part_number,
+                )
+            )
         row = {field.name: getattr(commit, field.name) for field in fields(CommitFields)} | {
             "server": canonical(server) if server else "",
             "state": State.KEEPING if commit.file is not None else State.WAITING,
@@ -541,7 +567,7 @@ class Store(FileOrigins):
         # A copy that has its final name is complete: only its row was not written.
         content = copy if copy.exists() else held or source
         if content is None:
-            text = "its file was not copied in time; commit it again, then discard this"
+            text = message("its file was not copied in time; commit it again, then discard this")
             self.update(entry.id, state=State.HELD, reason=text)
             return
         try:
@@ -549,7 +575,11 @@ class Store(FileOrigins):
             sha256, size = self._copied(content, copy, "" if is_copied else entry.stamp)
         except _WrittenError as error:
             if held is not None:
-                sentence = f"{entry.path or entry.file_name}: {error}; commit it again, then discard this"
+                sentence = message(
+                    "{file_name}: {error}; commit it again, then discard this",
+                    file_name=entry.path or entry.file_name,
+                    error=error,
+                )
                 self.update(entry.id, state=State.HELD, reason=sentence)
                 return
             raise self._lost(entry, content, str(error)) from error
@@ -557,10 +587,15 @@ class Store(FileOrigins):
             now = self.by_key(key)
             if now is None or now.sha256:  # another program was quicker
                 return
-            sentence = f"cannot be copied for sending ({error.strerror or error})"
+            sentence = message("cannot be copied for sending ({error})", error=error.strerror or error)
             if held is not None or content is copy:
                 self.update(
-                    entry.id, reason=f"{entry.path or entry.file_name}: {sentence}; it is tried again"
+                    entry.id,
+                    reason=message(
+                        "{file_name}: {sentence}; it is tried again",
+                        file_name=entry.path or entry.file_name,
+                        sentence=sentence,
+                    ),
                 )
                 return
             raise self._lost(entry, content, sentence) from error
@@ -580,7 +615,9 @@ class Store(FileOrigins):
     def _lost(self, entry: Entry, content: Path, reason: str) -> DocumentError:
         with suppress(OutboxError):  # a row that stays has no file: the next sending holds it and says so
             self.discard(entry.id)
-        return DocumentError(str(content), f"{reason}; nothing was kept, commit it again")
+        return DocumentError(
+            str(content), message("{reason}; nothing was kept, commit it again", reason=reason)
+        )
 
     def add(self, commit: Commit, server: str = "") -> Entry:
         """Add row and copy; both are on disk when it returns."""
@@ -588,7 +625,7 @@ class Store(FileOrigins):
         self.finish(commit.key, commit.file)
         entry = self.by_key(commit.key)
         if entry is None:
-            raise InputError(f"{commit.path}: discarded while its copy was made")
+            raise InputError(message("{path}: discarded while its copy was made", path=commit.path))
         return entry
 
     # -- what the user decides --------------------------------------------------------------------------
@@ -602,8 +639,10 @@ class Store(FileOrigins):
         entry = self._existing(entry_id)
         if entry.superseded:
             raise ConflictError(
-                f"{entry.part_number or entry.label}: a newer commit was sent; this one would "
-                "overwrite it. Discard this commit"
+                message(
+                    "{label}: a newer commit was sent; this one would overwrite it. Discard this commit",
+                    label=entry.part_number or entry.label,
+                )
             )
         ready = State.WAITING if entry.sha256 or not entry.file_left else State.KEEPING
         renamed = SAME_PART if entry.renamed == ASKED else entry.renamed
@@ -642,7 +681,9 @@ class Store(FileOrigins):
             with open(held or self.copies / entry.copy, "rb") as read, replacing(target, mode=0o644) as out:
                 shutil.copyfileobj(read, out, _BLOCK)
         except OSError as error:
-            raise DocumentError(str(target), f"cannot be written ({error.strerror or error})") from error
+            raise DocumentError(
+                str(target), message("cannot be written ({error})", error=error.strerror or error)
+            ) from error
 
     # -- pauses -----------------------------------------------------------------------------------------
 
@@ -834,8 +875,11 @@ class Store(FileOrigins):
         path = self.copies / entry.copy
         if content_hash(path) != entry.sha256:
             raise InputError(
-                f"{entry.path or entry.file_name}: the copy kept for sending is damaged, so it was not sent. "
-                "Commit the document again, then discard this"
+                message(
+                    "{file_name}: the copy kept for sending is damaged, so it was not sent. Commit "
+                    "the document again, then discard this",
+                    file_name=entry.path or entry.file_name,
+                )
             )
         return path
 
@@ -868,7 +912,7 @@ class Store(FileOrigins):
                 size += len(block)
                 write.write(block)
             if stamp and json.dumps(stamp_of(read.fileno())) != stamp:
-                raise _WrittenError("it was written again since the commit")
+                raise _WrittenError(message("it was written again since the commit"))
         return digest.hexdigest(), size
 
     def _drop_files(self, entry: Entry) -> None:
@@ -891,7 +935,12 @@ class Store(FileOrigins):
     def _existing(self, entry_id: int) -> Entry:
         entry = self.entry(entry_id)
         if entry is None:
-            raise InputError(f"the outbox has no entry {entry_id}; it was sent or discarded meanwhile")
+            raise InputError(
+                message(
+                    "the outbox has no entry {entry_id}; it was sent or discarded meanwhile",
+                    entry_id=entry_id,
+                )
+            )
         return entry
 
 

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
+from silo.bom.message import message
 from silo.platform.system import NAME, WINDOWS
 
 # Another program has the file open: a virus scanner, an indexer, a colleague. ERROR_ACCESS_DENIED,
@@ -93,5 +94,5 @@ class InUseError(PermissionError):
     """Another program has the file open; :func:`patiently` waits for it."""
 
     def __init__(self, code: int, path: str) -> None:
-        super().__init__(errno.EACCES, "another program has it open", path)
+        super().__init__(errno.EACCES, message("another program has it open"), path)
         self.winerror = code

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
+from silo.bom.message import message
 from silo.platform.system import WINDOWS
 
 if TYPE_CHECKING:
@@ -93,10 +94,10 @@ def how_it_ended(code: int) -> str:
     names = {int(number): number.name for number in signal.Signals}
     name = names.get(code - 128 if code > 128 else -code, str(-code) if code < 0 else "")
     if code >= 0xC0000000:
-        return f"crashed (0x{code:08X})"
+        return message("crashed (0x{code})", code=f"{code:08X}")
     if name:
         return f"{'crashed' if name in _CRASHES else 'was ended'} ({name})"
-    return f"ended with exit code {code}"
+    return message("ended with exit code {code}", code=code)
 
 
 def python_beside(prefix: str) -> list[str]:

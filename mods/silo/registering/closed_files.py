@@ -12,6 +12,7 @@ from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import DocumentError
 from silo.bom.findings import Finding
 from silo.bom.items.proposal import Proposal, propose_all
+from silo.bom.message import message
 from silo.bom_sync.resolved import resolve
 from silo.fcstd import check_stampable, stamp
 from silo.freecads.open_documents import OpenInFreecad, open_in_any
@@ -29,9 +30,10 @@ if TYPE_CHECKING:
     from silo.vault.reading import VaultReader
 
 
-OPEN = (
-    "it is open in FreeCAD, and saving it there would undo the registration. Close it there, or register it "
-    "from there (Silo, Register Parts), then run this again; --even-if-open registers it anyway"
+OPEN = message(
+    "it is open in FreeCAD, and saving it there would undo the registration. Close "
+    "it there, or register it from there (Silo, Register Parts), then run this "
+    "again; --even-if-open registers it anyway"
 )
 
 

@@ -34,6 +34,7 @@ from silo.bom.errors import (
     UnreachableError,
 )
 from silo.bom.items.proposal import Proposal
+from silo.bom.message import message
 from silo.bom.walk.identity import as_uuid
 from silo.bom_sync.memory import Memory, server_of
 from silo.bom_sync.standard_items import by_description, standard_item_memory
@@ -111,8 +112,13 @@ def unclear(proposal: Proposal, matches: Sequence[Mapping[str, Any]]) -> Mapping
     """Refuse to choose, if the user cannot be asked. Raises ConflictError that names the items."""
     numbers = ", ".join(str(item["part_number"]) for item in matches)
     raise ConflictError(
-        f"{proposal.name}: {numbers} may be its item: made by an interrupted run, or registered from this "
-        "document before. The same part, or a copy of it? Look at that, then take it or make a new item"
+        message(
+            "{name}: {numbers} may be its item: made by an interrupted run, or registered "
+            "from this document before. The same part, or a copy of it? Look at that, then "
+            "take it or make a new item",
+            name=proposal.name,
+            numbers=numbers,
+        )
     )
 
 
@@ -202,9 +208,14 @@ class _ItemRun:
         item = self.api.get_item_by_uuid(identity)
         if item is None:
             raise ConflictError(
-                f"{self.proposal.name}: {entry.doc_path} carries the identity {identity} now, and this "
-                "server has no such item: another computer registers it just now, or at another server. Wait "
-                "for that and register again; --adopt takes it over"
+                message(
+                    "{name}: {doc_path} carries the identity {identity} now, and this server has no "
+                    "such item: another computer registers it just now, or at another server. Wait "
+                    "for that and register again; --adopt takes it over",
+                    name=self.proposal.name,
+                    doc_path=entry.doc_path,
+                    identity=identity,
+                )
             )
         self.stamp(entry, identity)  # an open document does not have it yet
         return item

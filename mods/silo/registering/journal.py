@@ -24,6 +24,7 @@ from typing import Any
 
 from silo.bom.entry import BomEntry
 from silo.bom.errors import InputError
+from silo.bom.message import message
 from silo.folder_lock import folder_lock
 from silo.platform.user_folders import data_folder
 from silo.platform.whole_files import private_file, private_folder, remove_patiently, replacing
@@ -181,8 +182,12 @@ class Journal:
                 db.execute("COMMIT")
         except (sqlite3.Error, OSError) as error:
             raise InputError(
-                f"{self.path}: the journal of registrations cannot be read ({error}). Mend or move it; items "
-                "of an interrupted run may then exist without a file that names them."
+                message(
+                    "{path}: the journal of registrations cannot be read ({error}). Mend or move it; "
+                    "items of an interrupted run may then exist without a file that names them.",
+                    path=self.path,
+                    error=error,
+                )
             ) from error
 
     def _connect(self) -> sqlite3.Connection:
@@ -280,7 +285,12 @@ def _reserved(path: str) -> dict[str, dict[str, Any]]:
         return {}
     except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
         raise InputError(
-            f"{path}: what another computer began to register here cannot be read ({error!r}). Register on "
-            "that computer, or delete this file: an item that was begun may then be made a second time."
+            message(
+                "{path}: what another computer began to register here cannot be read ({error}). "
+                "Register on that computer, or delete this file: an item that was begun may then "
+                "be made a second time.",
+                path=path,
+                error=repr(error),
+            )
         ) from error
     return dict(reserved)

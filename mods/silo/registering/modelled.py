@@ -18,6 +18,7 @@ from typing import Any
 from silo.bom.entry import BomEntry
 from silo.bom.errors import DocumentError, InputError, SiloError
 from silo.bom.items.naming import is_generic
+from silo.bom.message import message
 from silo.bom.walk.document import label_of, located, object_name, own
 from silo.bom.walk.identity import document_identity, own_identity
 from silo.bom.walk.roles import DECLARABLE
@@ -96,8 +97,15 @@ def chosen(articles: Sequence[Modelled], names: Iterable[str], *, apart: bool = 
         ]
         if len(fitting) != 1:
             label_text = ", ".join(article.entry.object_name for article in articles) or "nothing"
-            what = "nothing" if not fitting else f"{len(fitting)} things"
-            raise InputError(f"{name!r} means {what} that is modelled in this file; there is: {label_text}")
+            what = "nothing" if not fitting else message("{count} things", count=len(fitting))
+            raise InputError(
+                message(
+                    "{name} means {what} that is modelled in this file; there is: {label_text}",
+                    name=repr(name),
+                    what=what,
+                    label_text=label_text,
+                )
+            )
         for article in fitting[0].apart() if apart else fitting:
             by_chain[article.objects] = article
     return list(by_chain.values())

@@ -20,6 +20,7 @@ from silo.bom.errors import (
 )
 from silo.bom.findings import FindingCode
 from silo.bom.items.proposal import crowded_files, propose
+from silo.bom.message import message
 from silo.registering.candidate import Candidate, CandidateFiles, ComponentState, OpenedFile, Similar
 from silo.registering.control import RegisterControl
 from silo.registering.journal import component_key
@@ -97,7 +98,9 @@ def offer(
     numbers = _numbers_by_identity(resolved)
     categories = api.categories(schema)
     if not categories:
-        raise ServerFaultError(f"schema {schema} has no categories on this server; is it a Silo server?")
+        raise ServerFaultError(
+            message("schema {schema} has no categories on this server; is it a Silo server?", schema=schema)
+        )
     tree = (extraction.assembly, *extraction.entries)
     copies = [
         entry

@@ -10,6 +10,7 @@ from typing import Any
 from silo.bom.errors import InputError, NotFoundError
 from silo.bom.items.categories import proposed_category
 from silo.bom.items.proposal import Proposal
+from silo.bom.message import message
 from silo.registering.candidate import Candidate, Similar
 
 ITEM_TYPES = ("part", "assembly", "consumable", "tool")
@@ -70,34 +71,48 @@ class RegistrationRequest:
         return replace(self, item_type=item_type, category=proposed(item_type) if follows else self.category)
 
 
-AS_UTF_8 = "save the table as CSV (UTF-8)"
+AS_UTF_8 = message("save the table as CSV (UTF-8)")
 
 
 def wrong_name(name: str, candidate: Candidate) -> str:
     """Say what is wrong with an item's name; "" if nothing is."""
     if not name:
-        return "name: it is empty"
+        return message("name: it is empty")
     if candidate.entry.standard and name != candidate.entry.standard:
-        return f"name: a standard part is called by its designation, {candidate.entry.standard}"
+        return message(
+            "name: a standard part is called by its designation, {standard}",
+            standard=candidate.entry.standard,
+        )
     try:
         name.encode("utf-8")
     except UnicodeEncodeError:
-        return f"name: {name!r} is no UTF-8; {AS_UTF_8}"
+        return message("name: {name} is no UTF-8; {as_utf_8}", name=repr(name), as_utf_8=AS_UTF_8)
     if "\ufffd" in name:
-        return f"name: {name!r} has lost letters (\ufffd); {AS_UTF_8}"
+        return message("name: {name} has lost letters (�); {as_utf_8}", name=repr(name), as_utf_8=AS_UTF_8)
     if len(name) > 200 or not name.isprintable():
-        return f"name: wanted one line of at most 200 characters that can be seen, got {name[:50]!r}"
+        return message(
+            "name: wanted one line of at most 200 characters that can be seen, got {name}",
+            name=repr(name[:50]),
+        )
     return ""
 
 
 def find_item(number: str, candidate: Candidate, api: Any) -> Similar:
     """Find the item that a component joins. InputError if it cannot."""
     if candidate.entry.is_standard:
-        raise InputError("a standard part has its item by its designation; leave this empty")
+        raise InputError(message("a standard part has its item by its designation; leave this empty"))
     try:
         item = api.get_item(number)
     except NotFoundError:
-        raise InputError(f"there is no item {number}; leave it empty for a new one") from None
+        raise InputError(
+            message("there is no item {number}; leave it empty for a new one", number=number)
+        ) from None
     if (item.item_type == "assembly") != (candidate.proposal.item_type == "assembly"):
-        raise InputError(f"{number} is an item of type {item.item_type}; the file holds another type")
+        raise InputError(
+            message(
+                "{number} is an item of type {item_type}; the file holds another type",
+                number=number,
+                item_type=item.item_type,
+            )
+        )
     return Similar(item.part_number, item.id, item.name)

@@ -18,6 +18,7 @@ from typing import Any
 
 from silo.bom.errors import InputError
 from silo.bom.headers import plain_cell, safe_cell
+from silo.bom.message import message
 from silo.bom.walk.document import relative
 from silo.registering.candidate import Candidate, CandidateFiles, ComponentState
 from silo.registering.offer import Offer
@@ -40,9 +41,9 @@ _AS_THEY_ARE = ("file", "object", "standard")
 SOURCES = {"": "", "made": "manufactured", "bought": "purchased"}
 
 _FILES = {
-    ComponentState.READ_ONLY: "the file is read-only",
-    ComponentState.ELSEWHERE: "the file is open in FreeCAD",
-    ComponentState.MISSING: "the file is missing",
+    ComponentState.READ_ONLY: message("the file is read-only"),
+    ComponentState.ELSEWHERE: message("the file is open in FreeCAD"),
+    ComponentState.MISSING: message("the file is missing"),
 }
 
 # What a spreadsheet would take for a number, a date, a time or a truth: "00123" comes back as 123, "1E5" as
@@ -73,18 +74,20 @@ def doubts(candidate: Candidate, earlier: CandidateFiles) -> list[str]:
     """List why a candidate may be an item already; ``earlier``: the candidates before it, which get their
     items first.
     """
-    reasons = [
-        f"Silo has this very file as {similar.part_number}"
+    reasons: list[str] = [
+        message("Silo has this very file as {part_number}", part_number=similar.part_number)
         if similar.same_file
-        else f"Silo has {similar.part_number} with the same name"
+        else message("Silo has {part_number} with the same name", part_number=similar.part_number)
         for similar in candidate.similar
     ]
     if twin := earlier.twin(candidate):
-        reasons.append(f"the same content as {twin.proposal.name}")
+        reasons.append(message("the same content as {name}", name=twin.proposal.name))
     if candidate.same_as:
-        reasons.append(f"carries the identity of {candidate.same_as}, as another file does")
+        reasons.append(
+            message("carries the identity of {same_as}, as another file does", same_as=candidate.same_as)
+        )
     if candidate.foreign:
-        reasons.append("carries an identity of another server, or of another computer's run")
+        reasons.append(message("carries an identity of another server, or of another computer's run"))
     return reasons
 
 
@@ -92,11 +95,11 @@ def remarks(candidate: Candidate, earlier: CandidateFiles) -> list[str]:
     """List what the user should know about a row."""
     texts = doubts(candidate, earlier)
     if candidate.proposal.is_guess:
-        texts.append("the category is a guess")
+        texts.append(message("the category is a guess"))
     if candidate.learnt:
-        texts.append("the category is the one chosen before in this folder")
+        texts.append(message("the category is the one chosen before in this folder"))
     if candidate.article is not None:
-        texts.append("modelled in the assembly's own file, not counted")
+        texts.append(message("modelled in the assembly's own file, not counted"))
     if words := _FILES.get(candidate.state):
         texts.append(words)
     return texts
@@ -196,9 +199,16 @@ def read_table(data: bytes, name: str) -> TableRows:
     """
     sheet = read_sheet(data, name, PLAN)
     twice = sorted({role for role, _ in sheet.columns.others})
-    problems = [f"line {sheet.header_line}: the column {column} is there more than once" for column in twice]
+    problems = [
+        message(
+            "line {header_line}: the column {column} is there more than once",
+            header_line=sheet.header_line,
+            column=column,
+        )
+        for column in twice
+    ]
     if problems:
-        raise InputError(f"{name} cannot be read; nothing was registered", problems)
+        raise InputError(message("{name} cannot be read; nothing was registered", name=name), problems)
     rows = []
     for row in sheet.rows:
         cells = dict.fromkeys(COLUMNS, "")
@@ -242,9 +252,11 @@ def requests_of(rows: Sequence[TableRow], offer: Offer, base: str, api: Any, nam
         row_problems: list[str] = []
         wanted = read_yes_no(row.cells["register"])
         if wanted is None:
-            row_problems.append(f"register: wanted yes or no, got {row.cells['register']!r}")
+            row_problems.append(
+                message("register: wanted yes or no, got {cells}", cells=repr(row.cells["register"]))
+            )
         if counts[row.key] > 1:
-            row_problems.append("the component is there more than once")
+            row_problems.append(message("the component is there more than once"))
         candidate = candidates.get(row.key)
         if candidate is not None and wanted:
             requests.append(request := _request(row, candidate, offer, api, row_problems))
@@ -254,11 +266,13 @@ def requests_of(rows: Sequence[TableRow], offer: Offer, base: str, api: Any, nam
             done += 1
         elif candidate is None and wanted:
             what = row.cells["standard"] or f"{row.cells['file']}#{row.cells['object']}"
-            hint = "" if what.isprintable() else f"; {AS_UTF_8}"
-            row_problems.append(f"{what} is no component here{hint}")
-        problems += [f"line {row.line}: {words}" for words in row_problems]
+            hint = "" if what.isprintable() else message("; {as_utf_8}", as_utf_8=AS_UTF_8)
+            row_problems.append(message("{what} is no component here{hint}", what=what, hint=hint))
+        problems += [message("line {line}: {words}", line=row.line, words=words) for words in row_problems]
     if problems:
-        raise InputError(f"{name}: nothing was registered, because some rows have problems", problems)
+        raise InputError(
+            message("{name}: nothing was registered, because some rows have problems", name=name), problems
+        )
     listed = {row.key for row in rows}
     unlisted = tuple(
         component
@@ -275,29 +289,50 @@ def _request(
     before = len(row_problems)
     row_problems += filter(None, [wrong_name(cells["name"], candidate)])
     if cells["source"] not in SOURCES:
-        row_problems.append(f"source: wanted made, bought or nothing; got {cells['source']!r}")
+        row_problems.append(
+            message("source: wanted made, bought or nothing; got {cells}", cells=repr(cells["source"]))
+        )
     elif cells["source"] != "bought" and (cells["supplier"] or cells["supplier_number"]):
         row_problems.append(
-            "source: a part with a supplier is bought; say bought, or leave the supplier empty"
+            message("source: a part with a supplier is bought; say bought, or leave the supplier empty")
         )
     if cells["type"] not in ITEM_TYPES:
-        row_problems.append(f"type: wanted {', '.join(ITEM_TYPES)}; got {cells['type']!r}")
+        row_problems.append(
+            message(
+                "type: wanted {item_types}; got {cells}",
+                item_types=", ".join(ITEM_TYPES),
+                cells=repr(cells["type"]),
+            )
+        )
     if cells["category"] not in offer.categories:
         row_problems.append(
-            f"category: there is no {cells['category']!r}; there are {', '.join(offer.categories)}"
+            message(
+                "category: there is no {cells}; there are {categories}",
+                cells=repr(cells["category"]),
+                categories=", ".join(offer.categories),
+            )
         )
     if not candidate.state.usable or candidate.state is ComponentState.ELSEWHERE:
-        row_problems.append(f"{cells['file']}: {_FILES.get(candidate.state, 'the file cannot be written')}")
+        row_problems.append(
+            message(
+                "{cells}: {state}",
+                cells=cells["file"],
+                state=_FILES.get(candidate.state, message("the file cannot be written")),
+            )
+        )
     elif cells["fingerprint"] not in ("", _fingerprint(candidate)):
         row_problems.append(
-            f"{cells['file']} has changed since the table was written; look at it, write a new one"
+            message(
+                "{cells} has changed since the table was written; look at it, write a new one",
+                cells=cells["file"],
+            )
         )
     existing = None
     if number := cells["part_number"]:
         try:
             existing = find_item(number, candidate, api)
         except InputError as error:
-            row_problems.append(f"part_number: {error}")
+            row_problems.append(message("part_number: {error}", error=error))
     if len(row_problems) > before:
         return None
     supply = (SOURCES[cells["source"]], cells["supplier"], cells["supplier_number"])
@@ -312,7 +347,10 @@ def _joined_before(request: RegistrationRequest, earlier: list[RegistrationReque
     earlier.append(request)
     number = request.existing.part_number if request.existing else ""
     return [
-        f"part_number: {number} is already for {other.name!r} above, another file; "
-        "register one of them with it"
+        message(
+            "part_number: {number} is already for {name} above, another file; register one of them with it",
+            number=number,
+            name=repr(other.name),
+        )
         for other in others[:1]
     ]

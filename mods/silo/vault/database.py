@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from silo.bom.errors import InputError
+from silo.bom.message import message
 from silo.platform.locks import hold_lock
 from silo.platform.whole_files import remove_patiently
 
@@ -107,13 +108,18 @@ class IndexDatabase:
         try:
             if given and not _may_replace(path):
                 raise InputError(
-                    f"{path} is not an index of silo-mod, so it is left as it is. Name another file."
+                    message(
+                        "{path} is not an index of silo-mod, so it is left as it is. Name another file.",
+                        path=path,
+                    )
                 )
             path.parent.mkdir(parents=True, exist_ok=True)
             for attempt in range(2):
                 self._guard = hold_lock(f"{path}.lock", shared=True)
                 if self._guard is None:
-                    self.trouble = f"the index {path} is being made again by another process"
+                    self.trouble = message(
+                        "the index {path} is being made again by another process", path=path
+                    )
                     return
                 try:
                     database = _connected(path)
@@ -124,7 +130,9 @@ class IndexDatabase:
                     log.info("%s: %s; it is made again", path, error)
                     self._guard.close()
                     if attempt or not _removed(path):
-                        self.trouble = f"the index {path} cannot be used ({error})"
+                        self.trouble = message(
+                            "the index {path} cannot be used ({error})", path=path, error=error
+                        )
                         return
         except (OSError, sqlite3.Error) as error:
             self._give_up(error)
@@ -132,7 +140,11 @@ class IndexDatabase:
     def _give_up(self, error: sqlite3.Error | OSError) -> None:
         """Stop writing to a database that fails; read from it as long as that works."""
         if not self.trouble:
-            self.trouble = f"the index {self.path} cannot be used ({error}); nothing is lost but time"
+            self.trouble = message(
+                "the index {path} cannot be used ({error}); nothing is lost but time",
+                path=self.path,
+                error=error,
+            )
             log.warning("%s", self.trouble)
         self.writes = False
         if isinstance(error, sqlite3.DatabaseError) and not isinstance(error, sqlite3.OperationalError):
@@ -172,7 +184,9 @@ def _connected(path: Path) -> sqlite3.Connection:
             database.execute(f"PRAGMA application_id = {_APPLICATION}")
             database.execute(f"PRAGMA user_version = {FORMAT}")
         elif (application, version) != (_APPLICATION, FORMAT):
-            raise _Unusable(f"it has format {version}, wanted is {FORMAT}")
+            raise _Unusable(
+                message("it has format {version}, wanted is {format}", version=version, format=FORMAT)
+            )
         database.execute("COMMIT")
         return database
     except sqlite3.OperationalError:

@@ -17,7 +17,7 @@ from silo.bom.compare.states import ComparedAssembly
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import InputError, SiloError
 from silo.bom.findings import Finding, Severity
-from silo.bom.message import altered
+from silo.bom.message import altered, message
 from silo.bom.view.folders import shorten
 from silo.bom.walk.document import relative
 from silo.bom.walk.links import extract
@@ -59,7 +59,7 @@ def read_folder(
     """
     base = os.path.realpath(folder)
     if not os.path.isdir(base):
-        raise InputError(f"{folder} is not a folder. Name a folder of FreeCAD files.")
+        raise InputError(message("{folder} is not a folder. Name a folder of FreeCAD files.", folder=folder))
     assemblies: dict[tuple[str, str], ComparedAssembly] = {}
     unreadable = [(relative(os.path.join(root or base, path), base), why) for path, why in lost]
     findings: dict[Finding, None] = {}

@@ -21,6 +21,7 @@ from pathlib import Path, PurePosixPath
 from typing import BinaryIO
 
 from silo.bom.errors import DocumentError, InputError
+from silo.bom.message import message
 from silo.files import IGNORE_FILE
 from silo.platform.processes import child_options
 from silo.platform.system import WINDOWS
@@ -68,7 +69,9 @@ def top_of(folder: Path | str) -> tuple[str, str, bool]:
     while not os.path.isdir(real) and os.path.dirname(real) != real and not os.path.lexists(real):
         real = os.path.dirname(real)
     if not os.path.isdir(real):
-        raise InputError(f"{folder} is not a folder. Name a folder inside a git repository.")
+        raise InputError(
+            message("{folder} is not a folder. Name a folder inside a git repository.", folder=folder)
+        )
     if _git(real, "rev-parse", "--is-bare-repository").strip() == b"true":
         return _path(real, "--absolute-git-dir"), "", False
     top = _path(real, "--show-toplevel")
@@ -144,7 +147,13 @@ def _listed(repository: str, revision: str) -> Iterator[tuple[bytes, str, str]]:
             continue
         # Git refuses such names; a repository made by something else may hold them.
         if name.startswith("/") or ".." in parts or (WINDOWS and any(c in name for c in ":\\")):
-            raise InputError(f"The revision {revision} holds a file named {name!r}, which leaves its folder.")
+            raise InputError(
+                message(
+                    "The revision {revision} holds a file named {name}, which leaves its folder.",
+                    revision=revision,
+                    name=repr(name),
+                )
+            )
         yield kind, blob.decode(), name
 
 
@@ -161,7 +170,15 @@ def _submodule(
         except InputError:
             continue
         return [(f"{name}/{path}", why) for path, why in lost]
-    return [(name, f"this sub-module is not here at {commit[:12]} (git submodule update --init --recursive)")]
+    return [
+        (
+            name,
+            message(
+                "this sub-module is not here at {commit} (git submodule update --init --recursive)",
+                commit=commit[:12],
+            ),
+        )
+    ]
 
 
 def _lay_link(path: Path, to: str, target: Path) -> None:
@@ -219,14 +236,20 @@ def _copy(ask: BinaryIO, answer: BinaryIO, blob: str, name: str, file: BinaryIO)
     except BrokenPipeError:
         head = [b"git ended"]
     if head[1:] == [b"missing"]:
-        raise DocumentError(name, "this clone of the repository lacks its content (git fetch)")
+        raise DocumentError(name, message("this clone of the repository lacks its content (git fetch)"))
     if len(head) != 3:
-        raise InputError(f"git has no content of {name}: {b' '.join(head).decode(errors='replace')}")
+        raise InputError(
+            message(
+                "git has no content of {name}: {errors}",
+                name=name,
+                errors=b" ".join(head).decode(errors="replace"),
+            )
+        )
     left = int(head[2])
     while left > 0:
         piece = answer.read(min(left, _CHUNK))
         if not piece:
-            raise InputError(f"git stopped in the middle of {name}.")
+            raise InputError(message("git stopped in the middle of {name}.", name=name))
         file.write(piece)
         left -= len(piece)
     answer.read(1)  # the line feed behind each object
@@ -260,7 +283,7 @@ def _environment() -> dict[str, str]:
 def _git(repository: str, *words: str) -> bytes:
     program = shutil.which("git")
     if program is None:
-        raise InputError("git is not on the PATH; it is needed to read revisions.")
+        raise InputError(message("git is not on the PATH; it is needed to read revisions."))
     command = [program, *words]
     done: subprocess.CompletedProcess[bytes] = subprocess.run(
         command, cwd=repository, env=_environment(), capture_output=True, check=False, **child_options()
@@ -268,13 +291,19 @@ def _git(repository: str, *words: str) -> bytes:
     if done.returncode:
         said = done.stderr.decode(errors="replace").strip() or _no_answer(repository, words)
         what = f"{words[0]} {words[-1].removesuffix('^{commit}')}"
-        raise InputError(f"git {what} failed in {repository}: {said}")
+        raise InputError(
+            message("git {what} failed in {repository}: {said}", what=what, repository=repository, said=said)
+        )
     return done.stdout
 
 
 def _no_answer(repository: str, words: Sequence[str]) -> str:
     """Say why git may have answered nothing."""
-    reason = "there is no common ancestor" if words[0] == "merge-base" else "it does not know this revision"
+    reason = (
+        message("there is no common ancestor")
+        if words[0] == "merge-base"
+        else message("it does not know this revision")
+    )
     if _git(repository, "rev-parse", "--is-shallow-repository").strip() == b"true":
-        reason += "; the clone is shallow, so fetch more of it (git fetch --unshallow)"
+        reason += message("; the clone is shallow, so fetch more of it (git fetch --unshallow)")
     return reason

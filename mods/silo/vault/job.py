@@ -25,6 +25,7 @@ from silo.batch import SyncOptions, TopResult, source_document, suggest_by_ident
 from silo.bom.errors import CancelledError, DocumentError, SiloError
 from silo.bom.findings import FindingCode
 from silo.bom.items.lookup import Known
+from silo.bom.message import message
 from silo.bom_sync import Outcome, Resolved, Status, SyncApi, sync
 from silo.bom_sync.resolved import blocking, known_items, resolve_known
 from silo.bom_sync.steps import plain_lines
@@ -43,8 +44,12 @@ def only_job(folder: str) -> Iterator[str]:
     """
     with folder_lock(folder, NAME, "synced") as problem:
         yield problem and (
-            f"{folder} cannot be locked ({problem}): a job of another user or machine is not "
-            "noticed. Two jobs at once cost requests; the BOMs are right anyway."
+            message(
+                "{folder} cannot be locked ({problem}): a job of another user or machine is not "
+                "noticed. Two jobs at once cost requests; the BOMs are right anyway.",
+                folder=folder,
+                problem=problem,
+            )
         )
 
 
@@ -132,7 +137,7 @@ class SyncJob:
                     asked.append(first)
                 outcomes = [future.result() for future in asked]
             except BaseException:  # Ctrl-C, also while the first are sent; the senders end what is under way
-                self.stopped = self.stopped or CancelledError("the job was stopped")
+                self.stopped = self.stopped or CancelledError(message("the job was stopped"))
                 self.stop.set()
                 raise
         return [
@@ -190,7 +195,7 @@ class SyncJob:
         """
         if not self.reading.index.untouched(resolved.assembly.doc_path):
             raise DocumentError(
-                resolved.assembly.doc_path, "it was changed while the job ran; the next run takes it"
+                resolved.assembly.doc_path, message("it was changed while the job ran; the next run takes it")
             )
         return source_document(resolved.assembly)
 

@@ -16,6 +16,7 @@ from typing import Any
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import SeveralAssembliesError, SiloError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
+from silo.bom.message import message
 from silo.bom.snapshot import whole_row
 from silo.bom.walk.links import MAX_LEVELS, Rings
 from silo.bom.walk.shared_identity import copied_identity
@@ -287,8 +288,11 @@ def _put_in_order(plan: Plan) -> None:
         plan.layers.append([plan.nodes[key] for key in waits])
     for deep in plan.layers[MAX_LEVELS:]:
         for node in deep:
-            message = f"The assembly is nested more than {MAX_LEVELS} levels deep, so it is not synced."
-            _tell(plan, node.key, FindingCode.TOO_DEEP, message, [node.key])
+            text = message(
+                "The assembly is nested more than {max_levels} levels deep, so it is not synced.",
+                max_levels=MAX_LEVELS,
+            )
+            _tell(plan, node.key, FindingCode.TOO_DEEP, text, [node.key])
 
 
 def _report_rings(plan: Plan, keys: Sequence[Key]) -> None:
@@ -315,12 +319,16 @@ def _find_copies(plan: Plan) -> None:
         if len({node.content for node in nodes}) > 1:
             keys = [node.key for node in nodes]
             files = ", ".join(sorted(str(Place(*key)) for key in keys))
-            message = (
-                f"{len(nodes)} assemblies carry the same Silo identity {uuid}: {files}. They hold different "
-                "components, so none of them is synced. Give the new one a number of its own."
+            text = message(
+                "{count} assemblies carry the same Silo identity {uuid}: {files}. They hold "
+                "different components, so none of them is synced. Give the new one a number of "
+                "its own.",
+                count=len(nodes),
+                uuid=uuid,
+                files=files,
             )
             for key in keys:
-                _tell(plan, key, FindingCode.COPIED_IDENTITY, message, keys)
+                _tell(plan, key, FindingCode.COPIED_IDENTITY, text, keys)
     paths: dict[str, set[str]] = {}
     for uuid, path in plan.places:
         paths.setdefault(uuid, set()).add(path)
@@ -329,9 +337,9 @@ def _find_copies(plan: Plan) -> None:
             plan.shared.append(copied_identity(uuid, tuple(map(Place, sorted(several)))))
 
 
-def _tell(plan: Plan, key: Key, code: FindingCode, message: str, where: Iterable[Key]) -> None:
+def _tell(plan: Plan, key: Key, code: FindingCode, text: str, where: Iterable[Key]) -> None:
     places = tuple(sorted({Place(*place) for place in where}))
-    plan.findings.setdefault(key, []).append(Finding(code, Severity.ERROR, message, places))
+    plan.findings.setdefault(key, []).append(Finding(code, Severity.ERROR, text, places))
 
 
 def _find_meant(plan: Plan, reading: VaultReader) -> None:

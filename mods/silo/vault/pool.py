@@ -10,6 +10,7 @@ from typing import Any
 from uuid import uuid4
 
 from silo.bom.errors import InputError
+from silo.bom.message import message
 from silo.platform.processes import workers
 from silo.vault.questions import Done, KnownFiles, Question, collect_seldom, work
 
@@ -101,8 +102,10 @@ def _dask_client(address: str) -> Any:
     try:
         from dask.distributed import Client
     except ImportError as error:
-        raise InputError("--dask needs the extra: pip install 'silo-mod[dask]'") from error
+        raise InputError(message("--dask needs the extra: pip install 'silo-mod[dask]'")) from error
     try:
         return Client(address, timeout=10, set_as_default=False)
     except (OSError, ValueError) as error:
-        raise InputError(f"no Dask scheduler answers at {address}: {error}") from error
+        raise InputError(
+            message("no Dask scheduler answers at {address}: {error}", address=address, error=error)
+        ) from error

@@ -33,6 +33,7 @@ from silo.bom.errors import (
     RouteMissingError,
     SeveralAssembliesError,
 )
+from silo.bom.message import message
 from silo.bom.walk.identity import held_items
 from silo.bom.walk.links import extract, file_bom
 from silo.bom_sync.memory import server_of
@@ -146,12 +147,15 @@ def find_project(tops: Sequence[str], root: str | None = None) -> Project:
     """
     if root is not None:
         if not os.path.isdir(root):
-            raise InputError(f"{root} is not a folder; name the folder of the project")
+            raise InputError(message("{root} is not a folder; name the folder of the project", root=root))
         return Project(one_path(root))
     roots = {marked.root for top in tops if (marked := Project.of(top)) is not None}
     if len(roots) > 1:
         raise InputError(
-            f"these files are of several projects: {', '.join(sorted(roots))}; commit each alone"
+            message(
+                "these files are of several projects: {roots}; commit each alone",
+                roots=", ".join(sorted(roots)),
+            )
         )
     if roots:
         return Project(roots.pop())
@@ -160,7 +164,7 @@ def find_project(tops: Sequence[str], root: str | None = None) -> Project:
         return Project(folders[0])
     files = [one_path(top) for top in documents_in(tops)]
     if not files:
-        raise InputError(f"no FreeCAD files (*.FCStd) in {', '.join(tops)}")
+        raise InputError(message("no FreeCAD files (*.FCStd) in {tops}", tops=", ".join(tops)))
     reached = [os.path.dirname(path) for path in _reached(files, Locator())[0]]
     try:
         common = os.path.commonpath(reached)
@@ -177,7 +181,13 @@ def read_project(tops: Sequence[str], project: Project, *, hardware: bool = True
     paths = [one_path(path) for path in documents_in(tops)]
     stray = [path for path in paths if project.place(path) is None]
     if stray:
-        raise InputError(f"{stray[0]} lies outside the project {project.root}; name its folder with --root")
+        raise InputError(
+            message(
+                "{stray} lies outside the project {root}; name its folder with --root",
+                stray=stray[0],
+                root=project.root,
+            )
+        )
     locator = Locator(project.root)
     order, unreadable, outside, missing = _reached(paths, locator, project)
     noted = project.records()

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 from silo.api.address import canonical
 from silo.bom.errors import DocumentError
+from silo.bom.message import message
 from silo.checksums import content_hash
 from silo.fcstd import Library
 from silo.fcstd.linked import identity_in
@@ -46,7 +47,7 @@ class PullState(StrEnum):
     UPDATED = "updated"  # replaced an older revision
     EDITED = "edited"  # local edits that are not in Silo: not touched
     WAITING = "waiting"  # its commit is in the queue, and not in Silo yet: not touched
-    SET_BACK = "server set back"  # it is of a revision that the server has lost: not touched
+    SET_BACK = message("server set back")  # it is of a revision that the server has lost: not touched
     OVERWRITTEN = "overwritten"  # local edits, replaced at the user's word; a copy is kept
     OPEN = "open"  # FreeCAD has it open: not touched
 
@@ -209,7 +210,11 @@ def place(tree: FileTree, into: Path | str, rules: Rules = Rules()) -> Pulled:
         target = anchor.joinpath(*where.split("/"))
         if (before := taken.get(one_path(str(target)))) is not None:
             if (before.part_number, before.revision) != (one.part_number, one.revision.revision_number):
-                why = f"{before.part_number}, revision {before.revision}, has the same place on this disk"
+                why: str = message(
+                    "{part_number}, revision {revision}, has the same place on this disk",
+                    part_number=before.part_number,
+                    revision=before.revision,
+                )
                 lost.append(LostLink(one.position, where, why))
             continue
         if why := _in_the_way(target, base):
@@ -229,9 +234,9 @@ def place(tree: FileTree, into: Path | str, rules: Rules = Rules()) -> Pulled:
     top = placed[0].path
     for one in tree.attachments:
         beside = _place_beside(one, folders.get(one.position, top.parent), taken)
-        why = "its name is taken there" if beside is None else _in_the_way(beside, base)
-        if beside is None or why:
-            lost.append(LostLink(one.position, one.revision.file_name or "", why))
+        reason = message("its name is taken there") if beside is None else _in_the_way(beside, base)
+        if beside is None or reason:
+            lost.append(LostLink(one.position, one.revision.file_name or "", reason))
             continue
         placed.append(_place(one, beside, rules))
         taken[one_path(str(beside))] = placed[-1]
@@ -258,9 +263,9 @@ def _place_beside(one: Fetched, folder: Path, taken: Container[str]) -> Path | N
 def _in_the_way(target: Path, base: Path) -> str:
     """Say why a file cannot be written to its place, although the disk accepts others; "" if it can."""
     if base not in Path(os.path.realpath(target)).parents:
-        return f"its place leads out of {base}; nothing was written there"
+        return message("its place leads out of {base}; nothing was written there", base=base)
     if target.is_dir():
-        return "a folder has its place and name"
+        return message("a folder has its place and name")
     return ""
 
 
@@ -293,7 +298,9 @@ def _place(one: Fetched, target: Path, rules: Rules) -> PulledFile:
         with one.content.open("rb") as read, replacing(real, mode=0o644) as write:
             shutil.copyfileobj(read, write, 1 << 20)
     except OSError as error:
-        raise DocumentError(str(target), f"cannot be written ({error.strerror or error})") from error
+        raise DocumentError(
+            str(target), message("cannot be written ({error})", error=error.strerror or error)
+        ) from error
     return done(state, kept)
 
 

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 from silo.bom.errors import DocumentError, InputError, SeveralAssembliesError
 from silo.bom.findings import respelt_findings
+from silo.bom.message import message
 from silo.bom.snapshot import to_plain
 from silo.bom.walk.links import extract
 from silo.bom.walk.roots import choose_assembly
@@ -60,7 +61,7 @@ class Question:
 
 @lru_cache(maxsize=256)
 def _name(assembly: str | None, hardware: bool, below: bool, name_only: bool) -> str:
-    words = ("bom" if below else "level") + ("" if hardware else " without hardware")
+    words = ("bom" if below else "level") + ("" if hardware else message(" without hardware"))
     mark = "#" if name_only else "="
     return f"{engine()} {words} {'' if assembly is None else mark + assembly}"
 

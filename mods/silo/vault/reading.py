@@ -19,6 +19,7 @@ from uuid import uuid4
 
 from silo.bom.entry import Extraction
 from silo.bom.errors import DocumentError, InputError, SeveralAssembliesError, SiloError
+from silo.bom.message import message
 from silo.bom.snapshot import from_plain
 from silo.fcstd.contents import Content
 from silo.vault.answers import StoredAnswer
@@ -225,7 +226,7 @@ class VaultReader:
             try:
                 return self._counted(executor.submit(work, [question], known_files, str(uuid4())).result())[0]
             except BrokenExecutor:
-                reason = "the process that read it died; the file may need more memory than there is"
+                reason = message("the process that read it died; the file may need more memory than there is")
                 return FirstReading(
                     StoredAnswer(json.dumps({"document": [question.path, reason]}), "[{},[]]", lasting=False)
                 )

@@ -23,6 +23,7 @@ from silo.bom.compare.two_states import LineChange, compare_assemblies
 from silo.bom.entry import Extraction
 from silo.bom.errors import InputError, listed
 from silo.bom.items.naming import display_name
+from silo.bom.message import message
 from silo.bom.walk.links import extract
 from silo.bom.walk.roots import choose_assembly
 from silo.fcstd import Library
@@ -112,7 +113,14 @@ def line_texts(lines: Iterable[LineChange]) -> list[str]:
         elif line.new is None:
             texts.append(f"- {name} {line.entry.quantity:g}")
         elif line.old.quantity != line.new.quantity:
-            texts.append(f"{name} {line.old.quantity:g} → {line.new.quantity:g}")
+            texts.append(
+                message(
+                    "{name} {quantity} → {quantity2}",
+                    name=name,
+                    quantity=f"{line.old.quantity:g}",
+                    quantity2=f"{line.new.quantity:g}",
+                )
+            )
         else:
-            texts.append(f"{name} moved")
+            texts.append(message("{name} moved", name=name))
     return texts

@@ -25,6 +25,7 @@ from silo.api.revisions import checksum_of
 from silo.api.transport import Cancel, stop_if
 from silo.api.wire import Item, KnownContent, LinkedFile, Release, Revision
 from silo.bom.errors import DocumentError, InputError, NotFoundError, RouteMissingError
+from silo.bom.message import message
 from silo.fcstd.linked import recorded_paths
 from silo.file_kind import is_model
 from silo.locator import refusal
@@ -136,13 +137,21 @@ class _Fetch:
         if self.release is not None:
             wanted = list(filter(None, [self.frozen(holder)]))
         if not wanted:
-            which = "no file yet" if number is None else f"no file with the revision {number}"
+            which = (
+                message("no file yet")
+                if number is None
+                else message("no file with the revision {number}", number=number)
+            )
             if self.release is not None:
-                which = f"no file in revision {self.release.label}"
-            raise InputError(f"{item.part_number} has {which} in Silo")
+                which = message("no file in revision {label}", label=self.release.label)
+            raise InputError(
+                message("{part_number} has {which} in Silo", part_number=item.part_number, which=which)
+            )
         top = self.model(holder, wanted[0], exact=number is not None)
         if top is None:
-            raise InputError(f"{item.part_number} has no model in Silo, only other files")
+            raise InputError(
+                message("{part_number} has no model in Silo, only other files", part_number=item.part_number)
+            )
         self._at = top.created_at
         # The top lies where it lay in its project: a link that steps out of its folder and back leads to one
         # place.
@@ -169,8 +178,12 @@ class _Fetch:
             if is_model(self.content(holder.of, other)[0]):
                 if other.revision_number != number:
                     self.remarks.append(
-                        f"{holder.part_number or holder.id}: revision {number} is no model, so revision "
-                        f"{other.revision_number} was taken"
+                        message(
+                            "{id}: revision {number} is no model, so revision {revision_number} was taken",
+                            id=holder.part_number or holder.id,
+                            number=number,
+                            revision_number=other.revision_number,
+                        )
                     )
                 return other
             if exact or self.release is not None:
@@ -200,7 +213,7 @@ class _Fetch:
                 if revision is not None and place not in self.files:
                     return [(place, holder, revision)]
                 self.lost.append(
-                    LostLink(place, place, "it is in the release, and not in Silo at this place")
+                    LostLink(place, place, message("it is in the release, and not in Silo at this place"))
                 )
         return []
 
@@ -222,16 +235,30 @@ class _Fetch:
         stop_if(self.cancelled)
         if (file := self.files.get(position)) is not None:
             if file.item != holder.id:
-                path, other = (text or "another file" for text in (file.part_number, holder.part_number))
-                self.lost.append(LostLink(position, position, f"{path} and {other} want the same place"))
+                path, other = (
+                    text or message("another file") for text in (file.part_number, holder.part_number)
+                )
+                self.lost.append(
+                    LostLink(
+                        position,
+                        position,
+                        message("{path} and {other} want the same place", path=path, other=other),
+                    )
+                )
             return
         if len(self.files) >= self.most:
-            raise InputError(f"more than {self.most} files are not fetched in one go")
+            raise InputError(message("more than {most} files are not fetched in one go", most=self.most))
         self.progress(posixpath.basename(position), len(self.files))
         taken = self.model(holder, revision)
         if taken is None:
             number = holder.part_number or position
-            self.lost.append(LostLink(position, position, f"{number} has no model in Silo, only other files"))
+            self.lost.append(
+                LostLink(
+                    position,
+                    position,
+                    message("{number} has no model in Silo, only other files", number=number),
+                )
+            )
             return
         revision = taken
         content, sha256 = self.content(holder.of, revision)
@@ -242,7 +269,9 @@ class _Fetch:
         try:
             recorded = recorded_paths(content)
         except DocumentError as error:
-            self.lost.append(LostLink(position, "", f"its links cannot be read: {error.reason}"))
+            self.lost.append(
+                LostLink(position, "", message("its links cannot be read: {reason}", reason=error.reason))
+            )
             return
         if recorded:
             yield from self.linked(position, holder, revision, recorded)
@@ -278,7 +307,7 @@ class _Fetch:
             try:
                 several = self.client.attachments(number)
             except RouteMissingError:
-                self.remarks.append("this Silo lists no attachments, so none were fetched")
+                self.remarks.append(message("this Silo lists no attachments, so none were fetched"))
                 return
             for each in several:
                 kept = Revision(revision_number=each.revision_number, file_checksum=each.file_checksum)
@@ -310,16 +339,21 @@ class _Fetch:
             child = self.whose(link, target, contents) or self.means(path, link, items, others)
             why = _refused(path)
             if not why and child is None:
-                why = "no item in Silo is known for it: it was never committed"
+                why = message("no item in Silo is known for it: it was never committed")
                 if link is not None and not link.sha256:
-                    why = "it was not there either when the file was committed"
+                    why = message("it was not there either when the file was committed")
             chosen = self.choose(child, link.sha256 if link else "", by_top=by_top) if child else None
             if not why and chosen is None:
-                why = f"{(child.part_number if child else '') or path} has no file in Silo"
+                why = message(
+                    "{part_number} has no file in Silo",
+                    part_number=(child.part_number if child else "") or path,
+                )
             if not why and child is not None and not self.proves(link, child, contents):
                 name = posixpath.basename(path)
-                why = (
-                    f"{posixpath.basename(position)} was committed with another {name}, which is not in Silo"
+                why = message(
+                    "{position} was committed with another {name}, which is not in Silo",
+                    position=posixpath.basename(position),
+                    name=name,
                 )
                 self.lost.append(LostLink(position, path, why))
                 if chosen is None or (chosen.file_name or name).casefold() != name.casefold():
@@ -463,7 +497,18 @@ def attachments_beside(fetch: _Fetch) -> Iterator[Fetched]:
             content, sha256 = fetch.content(DocumentId(document), revision)
             earlier = fetch.client.revisions(DocumentId(document))
         except (NotFoundError, RouteMissingError) as error:
-            fetch.lost.append(LostLink(position, name, f"the {kind} of {number} cannot be fetched: {error}"))
+            fetch.lost.append(
+                LostLink(
+                    position,
+                    name,
+                    message(
+                        "the {kind} of {number} cannot be fetched: {error}",
+                        kind=kind,
+                        number=number,
+                        error=error,
+                    ),
+                )
+            )
             continue
         kept = revision.model_copy(update={"file_name": name, "kind": kind})
         yield Fetched(position, number, document, kept, content, sha256, tuple(earlier))
@@ -479,11 +524,11 @@ def _place_in_project(path: str) -> str:
 def _refused(path: str) -> str:
     """Say why a recorded path is not followed; "" if it is."""
     if _ABSOLUTE.match(path):
-        return "it is an absolute path, which has no place in another folder"
+        return message("it is an absolute path, which has no place in another folder")
     if (refused := refusal(path)) is not None:
-        return refused.detail or "its path cannot be one"
+        return refused.detail or message("its path cannot be one")
     if posixpath.splitext(path)[1].lower() != ".fcstd":
-        return "it is not a FreeCAD file"
+        return message("it is not a FreeCAD file")
     return ""
 
 

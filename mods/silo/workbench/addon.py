@@ -10,6 +10,7 @@ from functools import cached_property
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from silo.bom.message import message
 from silo.platform.spelling import one_path
 from silo.workbench.freecad import host
 from silo.workbench.gui import qt
@@ -83,7 +84,7 @@ class AddOn:
         # The first commit should be as quick as the others: its modules are imported before. Only
         # what has no widgets comes from the worker, for the classes of those are made in the GUI thread.
         self.session.aside(
-            "Getting ready",
+            message("Getting ready"),
             lambda _control: [import_module(f"silo.workbench.{name}") for name in WITHOUT_WIDGETS],
             done=lambda _modules: self._prepared(),
             failed=self._bug,
@@ -312,7 +313,12 @@ class AddOn:
         self.project.refresh()
 
     def _bug(self, error: BaseException) -> None:
-        host.error(plain(f"[Silo] unexpected problem: {type(error).__name__}: {error}", 500))
+        host.error(
+            plain(
+                message("[Silo] unexpected problem: {name}: {error}", name=type(error).__name__, error=error),
+                500,
+            )
+        )
         import traceback
 
         host.log("".join(traceback.format_exception(error)))

@@ -8,6 +8,7 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.errors import DocumentError
+from silo.bom.message import message
 from silo.bom.walk.links import extract, file_item
 from silo.freecads.open_documents import open_in_any
 from silo.workbench.commit.desk import CommitAnswer, Look
@@ -156,13 +157,13 @@ class LiveDesk:
         """Draw another revision as a ghost beside a document, or remove it."""
         doc = host.find_document(path)
         if doc is None:
-            raise DocumentError(path, "it is not open any more")
+            raise DocumentError(path, message("it is not open any more"))
         if self._overlay.ghost_of == (path, revision):
             self._overlay.clear()
             return None
         extraction = self.snapshot(doc).extraction
         if extraction is None:
-            raise DocumentError(path, "it holds no assembly, so there is nothing to compare")
+            raise DocumentError(path, message("it holds no assembly, so there is nothing to compare"))
         mine = [name for entry in extraction.entries for name in entry.instances]
         differences = self._overlay.compare(doc, extraction.assembly.object_name, mine, theirs)
         self._overlay.ghost_of = (path, revision)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from silo import spoken
 from silo.bom.errors import Exit, UnreachableError, counted, exit_of
+from silo.bom.message import message
 from silo.bom_sync.activity_text import draft_text
 from silo.cli.connection import client_of, reach
 from silo.cli.json_output import print_json
@@ -46,7 +47,7 @@ def add_commit(parser: argparse.ArgumentParser) -> None:
     add_options(
         parser,
         {
-            "--on-top": "send files that a colleague has committed since, on top of the colleague's",
+            "--on-top": message("send files that a colleague has committed since, on top of the colleague's"),
         },
     )
 
@@ -147,7 +148,9 @@ def _send_models(belonging: Belonging, client: SiloClient) -> tuple[int, list[st
     try:
         from silo.drawing.models import send_models
     except ImportError:
-        missing = 'Silo gets no models, sizes or masses of these files: pip install "silo-mod[inertia]"'
+        missing = message(
+            'Silo gets no models, sizes or masses of these files: pip install "silo-mod[inertia]"'
+        )
         return 0, [missing]
     files = [(Path(file.path), file.sha256) for file in belonging.files]
     return send_models(client, files, at=set_step)
@@ -159,9 +162,13 @@ def _show_models(models: int, undrawn: list[str]) -> None:
     from silo.cli.terminal import console, plain
 
     if models:
-        console().print(Text(spoken(f"Silo can show {counted(models, 'more file')} in 3D"), "dim"))
+        console().print(
+            Text(spoken(message("Silo can show {models} in 3D", models=counted(models, "more file"))), "dim")
+        )
     for problem in undrawn:
-        console().print(Text(plain(spoken(f"! {problem}. The commit stands")), "yellow"))
+        console().print(
+            Text(plain(spoken(message("! {problem}. The commit stands", problem=problem))), "yellow")
+        )
 
 
 def _unsound(belonging: Belonging) -> bool:
@@ -226,14 +233,14 @@ _MARKS = {
 }
 _WORDS = {
     "SAME": "same",
-    "NEW": "not in Silo",
+    "NEW": message("not in Silo"),
     "EDITED": "edited",
-    "NEWER": "newer in Silo",
-    "BOTH": "edited, and newer in Silo",
+    "NEWER": message("newer in Silo"),
+    "BOTH": message("edited, and newer in Silo"),
     "WAITING": "waiting",
-    "HELD": "held: its commit needs your choice",
-    "SET_BACK": "newer than the server, which was restored from a backup",
-    "UNKNOWN": "of an item that this server does not have",
+    "HELD": message("held: its commit needs your choice"),
+    "SET_BACK": message("newer than the server, which was restored from a backup"),
+    "UNKNOWN": message("of an item that this server does not have"),
 }
 
 
@@ -243,7 +250,7 @@ def _show(belonging: Belonging, standings: list[FileStanding]) -> None:
     from silo.cli.terminal import console, plain
 
     out = console()
-    out.print(Text(plain(spoken(f"Project {belonging.project.root}")), "bold"))
+    out.print(Text(plain(spoken(message("Project {root}", root=belonging.project.root))), "bold"))
     for standing in standings:
         mark, style = _MARKS[standing.state.name]
         line = (
@@ -252,34 +259,65 @@ def _show(belonging: Belonging, standings: list[FileStanding]) -> None:
             .append(f"  {spoken(_WORDS[standing.state.name])}", style)
         )
         if standing.newest is not None:
-            line.append(spoken(f"  revision {standing.newest.revision_number}"), "dim")
+            line.append(
+                spoken(
+                    message("  revision {revision_number}", revision_number=standing.newest.revision_number)
+                ),
+                "dim",
+            )
         if not standing.file.item:
             count = len({item for item, _ in standing.file.held})
-            held = f"{count} items in it" if count else "a file without a part number"
+            held = (
+                message("{count} items in it", count=count)
+                if count
+                else message("a file without a part number")
+            )
             line.append(f"  {spoken(held)}", "dim")
         if standing.file.moved_from:
-            line.append(plain(spoken(f"  was {standing.file.moved_from}")), "cyan")
+            line.append(
+                plain(spoken(message("  was {moved_from}", moved_from=standing.file.moved_from))), "cyan"
+            )
         out.print(line)
         if standing.held:
-            held = spoken(f"its BOM is held: {standing.held}")
-            out.print(Text(plain(f"  ✗ {held}"), "red"))
+            reason = spoken(message("its BOM is held: {held}", held=standing.held))
+            out.print(Text(plain(f"  ✗ {reason}"), "red"))
         if standing.file.problem:
-            out.print(Text(plain(spoken(f"  {standing.file.problem}")), "yellow"))
+            out.print(Text(plain(spoken(message("  {problem}", problem=standing.file.problem))), "yellow"))
     notes = [
         *(
-            (f"{place}: its link {link} leads out of the project, and is not sent")
+            (
+                message(
+                    "{place}: its link {link} leads out of the project, and is not sent",
+                    place=place,
+                    link=link,
+                )
+            )
             for place, link in belonging.outside
         ),
-        *((f"{place}: its link {link} leads to no file") for place, link in belonging.missing),
-        *((f"{place} cannot be read: {reason}") for place, reason in belonging.unreadable),
-        *((f"{place} is gone from the folder; Silo keeps it") for place in belonging.gone),
         *(
-            f"{place} has the identity of {first}: the same part, or a copy? Register the copy as a new part"
+            (message("{place}: its link {link} leads to no file", place=place, link=link))
+            for place, link in belonging.missing
+        ),
+        *(
+            (message("{place} cannot be read: {reason}", place=place, reason=reason))
+            for place, reason in belonging.unreadable
+        ),
+        *(
+            (message("{place} is gone from the folder; Silo keeps it", place=place))
+            for place in belonging.gone
+        ),
+        *(
+            message(
+                "{place} has the identity of {first}: the same part, or a copy? Register the "
+                "copy as a new part",
+                place=place,
+                first=first,
+            )
             for place, first in belonging.doubtful
         ),
     ]
     for note in notes:
-        out.print(Text(plain(spoken(f"! {note}")), "yellow"))
+        out.print(Text(plain(spoken(message("! {note}", note=note))), "yellow"))
 
 
 def _show_sent(
@@ -294,30 +332,35 @@ def _show_sent(
 
     out = console()
     for row in sent:
-        revision = f"revision {row['revision']}" if row["revision"] else ""
-        bom = f"BOM {row['bom'].replace('_', ' ')}" if row["bom"] else ""
+        revision = message("revision {row}", row=row["revision"]) if row["revision"] else ""
+        bom = message("BOM {row}", row=row["bom"].replace("_", " ")) if row["bom"] else ""
         text = ", ".join(filter(None, (row["part_number"], revision, bom, row["remark"])))
         out.print(Text("✓ ", "green").append(plain(f"{row['path']}  {spoken(text)}")))
         if row["blocked_by"]:
             out.print(Text(f"  ✗ {spoken(STATUS_WORDS[Status.BLOCKED])}", "red"))
-        for message in row["blocked_by"]:
-            out.print(Text(plain(f"    {spoken(shorten(message, base))}"), "red"))
+        for reason in row["blocked_by"]:
+            out.print(Text(plain(f"    {spoken(shorten(reason, base))}"), "red"))
     for entry in left:
-        text = spoken(f"{entry.label} waits in the queue: {entry.reason}")
+        text = spoken(message("{label} waits in the queue: {reason}", label=entry.label, reason=entry.reason))
         out.print(Text("✗ ", "red").append(plain(text)))
     for late in behind:
         advice = {
-            "NEWER": "was not sent: silo-mod pull fetches the newer file",
-            "BOTH": "was not sent: look at the newer file (silo-mod log); --on-top sends yours on top of it",
-            "SET_BACK": "was not sent: the server was restored from a backup; --on-top sends all such "
-            "files again",
-            "UNKNOWN": "was not sent: is this the right server? Else take the identity out and register it",
-        }.get(late.state.name, "was written while it was sent: commit it again")
+            "NEWER": message("was not sent: silo-mod pull fetches the newer file"),
+            "BOTH": message(
+                "was not sent: look at the newer file (silo-mod log); --on-top sends yours on top of it"
+            ),
+            "SET_BACK": message(
+                "was not sent: the server was restored from a backup; --on-top sends all such files again"
+            ),
+            "UNKNOWN": message(
+                "was not sent: is this the right server? Else take the identity out and register it"
+            ),
+        }.get(late.state.name, message("was written while it was sent: commit it again"))
         out.print(Text("✗ ", "red").append(plain(f"{late.file.place} {spoken(advice)}")))
     if report.busy:
-        out.print("Another program sends the queue now; what waits goes with it", style="yellow")
+        out.print(message("Another program sends the queue now; what waits goes with it"), style="yellow")
     if report.stopped_by is not None:
-        text = f"Stopped: {report.stopped_by}. Run it again to send the rest"
+        text = message("Stopped: {stopped_by}. Run it again to send the rest", stopped_by=report.stopped_by)
         out.print(plain(text), style="red", markup=False)
     if not (sent or left or behind):
-        out.print("Nothing to send: Silo has all of it")
+        out.print(message("Nothing to send: Silo has all of it"))

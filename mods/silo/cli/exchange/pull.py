@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from silo import spoken
 from silo.bom.errors import Exit, counted
+from silo.bom.message import message
 from silo.cli.connection import client_of, named_item
 from silo.cli.json_output import print_json
 from silo.cli.options import above_zero, add_each, add_options
@@ -27,7 +28,9 @@ def _revision(text: str) -> int | str:
     if re.fullmatch(RELEASE_LABEL, text, re.ASCII):
         return text
     if not text.isdigit():
-        raise argparse.ArgumentTypeError(f"{text[:50]!r} is neither a number above 0 nor a label such as B")
+        raise argparse.ArgumentTypeError(
+            message("{text} is neither a number above 0 nor a label such as B", text=repr(text[:50]))
+        )
     return above_zero(text)
 
 
@@ -43,8 +46,10 @@ def add_pull(parser: argparse.ArgumentParser) -> None:
     add_options(
         parser,
         {
-            "--attachments": "also the drawings, STEP files and other attachments, beside the models",
-            "--replace": "replace files with edits that are not in Silo; a copy of each is kept",
+            "--attachments": message(
+                "also the drawings, STEP files and other attachments, beside the models"
+            ),
+            "--replace": message("replace files with edits that are not in Silo; a copy of each is kept"),
         },
     )
 
@@ -66,7 +71,9 @@ def run_pull(args: argparse.Namespace) -> int:
             is_open=lambda path: not args.even_if_open and opened.has_file(path),
         )
         number = named_item(client, args.part_number).part_number
-        progress = lambda name, count: set_step(f"fetching {name}, {counted(count, 'file')} so far")  # noqa: E731
+        progress = lambda name, count: set_step(  # noqa: E731
+            message("fetching {name}, {count} so far", name=name, count=counted(count, "file"))
+        )
         wanted = {"progress": progress, "attachments": args.attachments}
         with fetched(client, number, args.revision, **wanted) as tree:
             into.mkdir(parents=True, exist_ok=True)
@@ -80,17 +87,27 @@ def run_pull(args: argparse.Namespace) -> int:
 
 _MARKS = {
     "new": ("+", "green", ""),
-    "same": ("=", "dim", "up to date"),
+    "same": ("=", "dim", message("up to date")),
     "updated": ("~", "yellow", "updated"),
-    "edited": ("✗", "red", "has edits that are not in Silo; left alone (--replace replaces it)"),
-    "overwritten": ("~", "yellow", f"replaced; your file is kept for {KEPT_ASIDE_DAYS} days at"),
-    "waiting": ("✗", "red", "waits in the queue; left alone (silo-mod queue, or --replace replaces it)"),
+    "edited": ("✗", "red", message("has edits that are not in Silo; left alone (--replace replaces it)")),
+    "overwritten": (
+        "~",
+        "yellow",
+        message("replaced; your file is kept for {kept_aside_days} days at", kept_aside_days=KEPT_ASIDE_DAYS),
+    ),
+    "waiting": (
+        "✗",
+        "red",
+        message("waits in the queue; left alone (silo-mod queue, or --replace replaces it)"),
+    ),
     "server set back": (
         "✗",
         "red",
-        "is newer than the server, which was restored; left alone (silo-mod commit --on-top sends it)",
+        message(
+            "is newer than the server, which was restored; left alone (silo-mod commit --on-top sends it)"
+        ),
     ),
-    "open": ("✗", "red", "is open in FreeCAD; left alone (close it, or --even-if-open)"),
+    "open": ("✗", "red", message("is open in FreeCAD; left alone (close it, or --even-if-open)")),
 }
 
 
@@ -103,13 +120,27 @@ def _show_pulled(pulled: Pulled, into: Path) -> None:
     for file in pulled.files:
         mark, style, words = _MARKS[file.state.value]
         text = Text(f"{mark} ", style).append(plain(os.path.relpath(file.path, os.path.realpath(into))))
-        text.append(spoken(f"  {file.part_number}, revision {file.revision}"), "dim")
+        text.append(
+            spoken(
+                message(
+                    "  {part_number}, revision {revision}",
+                    part_number=file.part_number,
+                    revision=file.revision,
+                )
+            ),
+            "dim",
+        )
         if words:
             text.append(f"  {spoken(words)}{f' {file.kept}' if file.kept else ''}", style)
         out.print(text)
     for lost in pulled.lost:
-        line = f"{lost.position}: {lost.path} was not fetched: {lost.reason}"
+        line = message(
+            "{position}: {path} was not fetched: {reason}",
+            position=lost.position,
+            path=lost.path,
+            reason=lost.reason,
+        )
         out.print(Text("✗ ", "bold red").append(plain(spoken(line)), ""))
     for remark in pulled.remarks:
         out.print(Text("! ", "yellow").append(plain(spoken(remark)), ""))
-    out.print(Text(plain(spoken(f"Open {pulled.top}")), "bold"))
+    out.print(Text(plain(spoken(message("Open {top}", top=pulled.top))), "bold"))

@@ -39,7 +39,7 @@ def add_queue(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "numbers", metavar="NUMBER", nargs="*", type=above_zero, help="commits, as list shows them"
     )
-    add_options(parser, {"--here": "retry: send them to the server in use instead"})
+    add_options(parser, {"--here": message("retry: send them to the server in use instead")})
 
 
 def run_queue(args: argparse.Namespace) -> int:
@@ -54,13 +54,19 @@ def run_queue(args: argparse.Namespace) -> int:
     with suppress(ConfigError):
         here = canonical(resolve_server(args.server, args.token).url)
     if args.do in ("discard", "save") and not args.numbers:
-        raise InputError(f"queue {args.do}: which commit? Give the number that `silo-mod queue` shows")
+        raise InputError(
+            message("queue {do}: which commit? Give the number that `silo-mod queue` shows", do=args.do)
+        )
     stopped = _retry(args, store, here) if args.do == "retry" else None
     for number in args.numbers:
         entry = next((pending for pending in store.entries() if pending.id == number), None)
         if entry is None:
             if args.do != "retry":
-                raise InputError(f"there is no commit {number} in the queue; `silo-mod queue` lists them")
+                raise InputError(
+                    message(
+                        "there is no commit {number} in the queue; `silo-mod queue` lists them", number=number
+                    )
+                )
         elif args.do == "discard":
             store.discard(number, keep=True)
         elif args.do == "save":
@@ -71,7 +77,7 @@ def run_queue(args: argparse.Namespace) -> int:
                     message("{path} is there already, and nothing is written over it", path=str(target))
                 )
             store.save_copy(number, target)
-            print(f"{target} is written", file=sys.stderr)
+            print(message("{target} is written", target=target), file=sys.stderr)
     left = store.entries()
     pause = store.pause(here) if here else None
     if pause is not None and not pause.left(store.clock()):
@@ -93,9 +99,16 @@ def _retry(args: argparse.Namespace, store: Store, here: str) -> SiloError | Non
     with client_of(args) as client:
         report = send_all(store, client, force=True, on_progress=set_sending_step)
     for sent in report.sent:
-        print(f"{sent.part_number} {sent.entry.label or sent.entry.file_name} is in Silo", file=sys.stderr)
+        print(
+            message(
+                "{part_number} {file_name} is in Silo",
+                part_number=sent.part_number,
+                file_name=sent.entry.label or sent.entry.file_name,
+            ),
+            file=sys.stderr,
+        )
     if report.busy:
-        print("silo-mod: another program sends just now", file=sys.stderr)
+        print(message("silo-mod: another program sends just now"), file=sys.stderr)
     return report.stopped_by
 
 
@@ -131,7 +144,7 @@ def _show_queue(
     if notice:
         out.print(plain(notice), style="yellow", markup=False)
     if not left:
-        out.print("Nothing waits: every commit of this computer is in Silo.", markup=False)
+        out.print(message("Nothing waits: every commit of this computer is in Silo."), markup=False)
         return
     table = table_of("", "Commit", "What", "Since", "State", "Why")
     for entry, said in queue_rows:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from silo.batch import SyncOptions, TopResult
 from silo.bom.errors import DocumentError, Exit, InputError
+from silo.bom.message import message
 from silo.cli.connection import client_of, reach
 from silo.cli.options import EACH, add_options
 from silo.cli.progress import count_steps, set_step
@@ -35,7 +36,7 @@ def add_sync(parser: argparse.ArgumentParser) -> None:
         default=["."],
         help="assembly files, or folders: all assemblies below them (default: this folder)",
     )
-    add_options(parser, {"--verbose": "each assembly that changes, and each file at fault"})
+    add_options(parser, {"--verbose": message("each assembly that changes, and each file at fault")})
 
 
 def run_sync(args: argparse.Namespace) -> int:
@@ -47,7 +48,7 @@ def run_sync(args: argparse.Namespace) -> int:
     refuse_assembly_of(args.tops, args.assembly)
     tops = documents_in(args.tops)
     if not tops:
-        raise InputError(f"no FreeCAD files (*.FCStd) in {', '.join(args.tops)}")
+        raise InputError(message("no FreeCAD files (*.FCStd) in {tops}", tops=", ".join(args.tops)))
     folders = [top for top in args.tops if Path(top).is_dir()]
     base = os.path.realpath(folders[0]) if len(folders) == len(args.tops) == 1 else ""
     options = SyncOptions(
@@ -117,7 +118,7 @@ def _results(
         if not plan.uuids and plan.nodes:
             reach(client)
         begin = time.monotonic()
-        set_step("asking the server")
+        set_step(message("asking the server"))
         progress = count_steps(len(plan.errors) + len({node.top for node in plan.nodes.values()}))
         for result in SyncJob(plan, reading, client, options, summary.base, stop).results():
             progress(result.top)
@@ -174,7 +175,7 @@ def _show(result: TopResult, *, whole: bool) -> None:
     if result.error is not None:
         words = str(result.error)
         where = "" if os.path.basename(result.top) in words else f"{result.top}: "
-        out.print(f"✗ {plain(where + words)}", style="red", markup=False)
+        out.print(message("✗ {words}", words=plain(where + words)), style="red", markup=False)
         return
     for outcome in result.outcomes:
         if not whole and not is_news(outcome):
@@ -201,7 +202,7 @@ def _show_summary(summary: RunSummary, *, whole: bool) -> None:
         for line, more in lines:
             out.print(f"  {plain(line)}", markup=False, soft_wrap=True)
             for text in more:
-                out.print(f"    {plain(text)}", markup=False, soft_wrap=True)
+                out.print(message("    {text}", text=plain(text)), markup=False, soft_wrap=True)
 
 
 _STYLES = {"New since the last run": "bold", "Moved": "cyan", "Warnings": "yellow", "Errors": "bold red"}

@@ -13,6 +13,7 @@ from silo.bom.consolidation import consolidation_findings, one_hint_each
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import BusyError, Exit, InputError
 from silo.bom.findings import FindingCode
+from silo.bom.message import message
 from silo.bom.view.flat_list import flat_json
 from silo.bom.view.folders import base_folder
 from silo.bom.view.tree_json import bom_json
@@ -32,22 +33,28 @@ def add_bom(parser: argparse.ArgumentParser) -> None:
     add_options(
         parser,
         {
-            "--flat": "quantities multiplied down the tree, each part once",
+            "--flat": message("quantities multiplied down the tree, each part once"),
             "--verify": (
-                "have freecadcmd compare the BOM with the solids that FreeCAD shows; 1 where they differ"
+                message(
+                    "have freecadcmd compare the BOM with the solids that FreeCAD shows; 1 where they differ"
+                )
             ),
-            "--resolve": "ask the server for part numbers and names",
+            "--resolve": message("ask the server for part numbers and names"),
             "--why PART": (
-                "show why the assembly itself has so many of a part (name, label or standard): each chain"
+                message(
+                    "show why the assembly itself has so many of a part (name, label or standard): each chain"
+                )
             ),
-            "--verbose": "also hints, such as links that an array could replace",
+            "--verbose": message("also hints, such as links that an array could replace"),
         },
     )
-    headings = ("part number", "name", "quantity", "unit", "file")
+    headings = (message("part number"), "name", "quantity", "unit", "file")
     add_outputs(
-        parser, {"--csv FILE": "write the lines as CSV (- for standard output)"}, csv_table(*headings)
+        parser,
+        {"--csv FILE": message("write the lines as CSV (- for standard output)")},
+        csv_table(*headings),
     )
-    add_outputs(parser, {"--xlsx FILE": "write the lines as a workbook"}, workbook(*headings))
+    add_outputs(parser, {"--xlsx FILE": message("write the lines as a workbook")}, workbook(*headings))
     parser.set_defaults(to_standard_output=("--csv",))
     only_with(parser, "--resolve", "--server", "--token")
     not_with(parser, "--verify", "--flat", "--resolve", "--csv", "--xlsx", "--why", *READING)
@@ -116,7 +123,7 @@ def _why(args: argparse.Namespace) -> int:
     from silo.fcstd import Library
 
     if os.path.isdir(args.top):
-        raise InputError("--why is for one assembly; name its file.")
+        raise InputError(message("--why is for one assembly; name its file."))
     with Library() as library:
         top = choose_assembly(library.open(args.top), args.assembly)
         first, *ways = why(top, [args.why], hardware=not args.no_hardware)
@@ -139,7 +146,7 @@ def _show_each(args: argparse.Namespace) -> int:
     incomplete.
     """
     if args.flat or args.resolve or args.csv or args.xlsx:
-        raise InputError("--flat, --resolve, --csv and --xlsx are for one assembly; name its file.")
+        raise InputError(message("--flat, --resolve, --csv and --xlsx are for one assembly; name its file."))
     from silo.cli.bom_display import bom_tree, findings_text
     from silo.cli.terminal import console, plain
 
@@ -158,7 +165,9 @@ def _show_each(args: argparse.Namespace) -> int:
             out.print(findings_text(extraction.findings, base))
         out.print()
     for path, words in errors.items() if not args.json else ():
-        out.print(f"✗ {plain(path)}: {plain(words)}", style="red", markup=False)
+        out.print(
+            message("✗ {path}: {words}", path=plain(path), words=plain(words)), style="red", markup=False
+        )
     return (
         Exit.UNDONE
         if errors

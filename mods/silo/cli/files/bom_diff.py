@@ -12,6 +12,7 @@ from silo import spoken
 from silo.bom.entry import BomEntry
 from silo.bom.errors import Exit, InputError
 from silo.bom.items.naming import display_name
+from silo.bom.message import message
 from silo.bom.view.folders import shorten
 from silo.bom.view.tree_json import finding_json
 from silo.cli.json_output import json_text, print_json
@@ -42,8 +43,10 @@ def add_bom_diff(parser: argparse.ArgumentParser) -> None:
         parser,
         {
             "--git A..B": (
-                "compare two revisions of a repository; A...B: from where B branched off A; A alone: "
-                "against the files as they are"
+                message(
+                    "compare two revisions of a repository; A...B: from where B branched off A; A "
+                    "alone: against the files as they are"
+                )
             )
         },
     )
@@ -83,19 +86,25 @@ def _two_states(args: argparse.Namespace) -> tuple[FolderBoms, FolderBoms]:
 
     if args.git is None:
         if len(args.folders) != 2:
-            raise InputError("Name two folders or two files, OLD and NEW, or two revisions with --git A..B.")
+            raise InputError(
+                message("Name two folders or two files, OLD and NEW, or two revisions with --git A..B.")
+            )
         if all(map(os.path.isfile, args.folders)):  # of one file, whatever its two states are called
             first, second = args.folders
             return read_file(first, os.path.basename(second)), read_file(second)
         return read_folder(args.folders[0]), read_folder(args.folders[1])
     if len(args.folders) > 1:
-        raise InputError("With --git name at most one folder, the part of the repository to compare.")
+        raise InputError(
+            message("With --git name at most one folder, the part of the repository to compare.")
+        )
     from silo.vault.git import lay_out, parse_range, top_of
 
     top, below, work_tree = top_of(args.folders[0] if args.folders else ".")
     chosen = parse_range(top, args.git)
     if chosen.new is None and not work_tree:
-        raise InputError(f"{top} has no work tree to compare with. Name two revisions, A..B.")
+        raise InputError(
+            message("{top} has no work tree to compare with. Name two revisions, A..B.", top=top)
+        )
     laid: dict[str, Path] = {}
     with scratch_folder("silo-bom-diff-") as scratch:
 
@@ -106,7 +115,9 @@ def _two_states(args: argparse.Namespace) -> tuple[FolderBoms, FolderBoms]:
 
         states = [state("old", chosen.old), state("new", chosen.new)]
         if not any((folder / below).is_dir() for folder, _ in states):
-            raise InputError(f"There are no FreeCAD files in {below or top}, before or after.")
+            raise InputError(
+                message("There are no FreeCAD files in {top}, before or after.", top=below or top)
+            )
         nothing = Path(scratch, "nothing")
         nothing.mkdir()
         old, new = (
@@ -117,11 +128,21 @@ def _two_states(args: argparse.Namespace) -> tuple[FolderBoms, FolderBoms]:
 
 
 def _title(change: AssemblyChange) -> str:
-    words = {"added": "new assembly", "removed": "assembly removed", "moved": "moved", "changed": ""}
+    words = {
+        "added": message("new assembly"),
+        "removed": message("assembly removed"),
+        "moved": "moved",
+        "changed": "",
+    }
     note = words[change.kind]
     if change.old and change.new and change.old.head.key != change.new.head.key:
-        note = f"was {change.old.head.doc_path}"
-    return f"{change.head.doc_path}: {_name(change.head)}{f' ({note})' if note else ''}"
+        note = message("was {doc_path}", doc_path=change.old.head.doc_path)
+    return message(
+        "{doc_path}: {head}{f}",
+        doc_path=change.head.doc_path,
+        head=_name(change.head),
+        f=message(" ({note})", note=note) if note else "",
+    )
 
 
 def _quantities(line: LineChange) -> str:
@@ -147,10 +168,16 @@ def _where(line: LineChange, change: AssemblyChange) -> str:
 
 
 def _incomplete(state: FolderBoms, name: str) -> list[str]:
-    words = [
-        f"{name}: {path} could not be read: {shorten(why, state.base)}" for path, why in state.unreadable
+    words: list[str] = [
+        message(
+            "{name}: {path} could not be read: {base}", name=name, path=path, base=shorten(why, state.base)
+        )
+        for path, why in state.unreadable
     ]
-    return words + [f"{name}: {shorten(finding.message, state.base)}" for finding in state.findings]
+    words += [
+        message("{name}: {text}", name=name, text=shorten(one.message, state.base)) for one in state.findings
+    ]
+    return words
 
 
 def _show_changes(changes: tuple[AssemblyChange, ...], old: FolderBoms, new: FolderBoms) -> None:
@@ -191,15 +218,17 @@ def _name(entry: BomEntry) -> str:
 
 def _unchanged(old: FolderBoms, new: FolderBoms) -> str:
     if not (old.assemblies or new.assemblies):
-        return "There is no assembly to compare, before or after."
-    part = "" if old.complete and new.complete else " as far as they could be read"
-    return f"No BOM changed{part}; assemblies compared: {len(new.assemblies)}."
+        return message("There is no assembly to compare, before or after.")
+    part = "" if old.complete and new.complete else message(" as far as they could be read")
+    return message(
+        "No BOM changed{part}; assemblies compared: {count}.", part=part, count=len(new.assemblies)
+    )
 
 
 def _markdown(changes: tuple[AssemblyChange, ...], old: FolderBoms, new: FolderBoms) -> str:
     from silo.batch import cell
 
-    lines = ["## BOM changes", ""]
+    lines = [message("## BOM changes"), ""]
     if not changes:
         lines += [_unchanged(old, new), ""]
     for change in changes:
@@ -212,7 +241,7 @@ def _markdown(changes: tuple[AssemblyChange, ...], old: FolderBoms, new: FolderB
         lines.append("")
     incomplete = [*_incomplete(old, "old"), *_incomplete(new, "new")]
     if incomplete:
-        lines += ["### Not complete", "", *(f"- {cell(words)}" for words in incomplete), ""]
+        lines += [message("### Not complete"), "", *(f"- {cell(words)}" for words in incomplete), ""]
     return "\n".join(lines).rstrip()
 
 

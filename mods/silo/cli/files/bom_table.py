@@ -12,6 +12,7 @@ from typing import Any
 from silo.bom.entry import Extraction
 from silo.bom.errors import ConfigError
 from silo.bom.headers import safe_cell
+from silo.bom.message import message
 from silo.bom.text import with_allowed_characters
 from silo.bom.view.flat_list import PIECES, flat_json
 from silo.bom.view.tree_json import bom_json
@@ -51,7 +52,9 @@ def write_xlsx(path: str, rows: list[list[str | int]]) -> None:
     try:
         from xlsxwriter import Workbook
     except ImportError:
-        raise ConfigError("--xlsx needs the package XlsxWriter: pip install 'silo-mod[server]'") from None
+        raise ConfigError(
+            message("--xlsx needs the package XlsxWriter: pip install 'silo-mod[server]'")
+        ) from None
     with replacing(Path(path)) as file, Workbook(file, {"in_memory": True}) as book:
         sheet = book.add_worksheet()
         for number, row in enumerate(rows):

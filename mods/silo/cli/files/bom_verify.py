@@ -9,6 +9,7 @@ import sys
 from typing import Any
 
 from silo.bom.errors import InputError, SiloError
+from silo.bom.message import message
 from silo.bom.view.folders import base_folder
 from silo.bom.view.tree_json import bom_json
 from silo.cli.json_output import print_json
@@ -26,12 +27,15 @@ def verify(args: argparse.Namespace) -> int:
     from silo.freecads.run import freecad_for, run_freecad
 
     if os.path.isdir(args.top):
-        raise InputError("--verify is for one file; name the file.")
+        raise InputError(message("--verify is for one file; name the file."))
     with Library() as library:
         extract(choose_assembly(library.open(args.top), args.assembly))
         read = [document for document in library.documents.values() if isinstance(document, FcstdDocument)]
         command, version = freecad_for(max(saved_by(document.ProgramVersion) for document in read))
-    print(f"Compared in FreeCAD {version} ({command}).", file=sys.stderr)
+    print(
+        message("Compared in FreeCAD {version} ({command}).", version=version, command=command),
+        file=sys.stderr,
+    )
     witness: dict[str, list[dict[str, Any]]] = {}
     ((top, error),) = run_freecad(
         [args.top], args.assembly, command=command, hardware=not args.no_hardware, witness=witness

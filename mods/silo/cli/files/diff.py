@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from silo.bom.compare.bom_diff import BomDiff
 from silo.bom.errors import Exit
 from silo.bom.items.naming import display_name
+from silo.bom.message import message
 from silo.bom.view.diff_rows import diff_json
 from silo.bom.view.folders import base_folder
 from silo.bom.view.tree_json import finding_json
@@ -111,10 +112,14 @@ def _folder_diff(args: argparse.Namespace) -> int:
     else:
         for words in (*summary.warnings, *summary.errors):
             out.print(plain(words), markup=False)
-        words = "no differences"
+        words = message("no differences")
         if drifted:
-            words = "there are differences, or what could not be compared (see above)"
-        out.print(f"Assemblies compared: {compared_count}; {words}.")
+            words = message("there are differences, or what could not be compared (see above)")
+        out.print(
+            message(
+                "Assemblies compared: {compared_count}; {words}.", compared_count=compared_count, words=words
+            )
+        )
     if summary.exit_code is Exit.REMOTE:
         return Exit.REMOTE
     return Exit.UNDONE if broken or (args.check and drifted) else Exit.DONE
@@ -145,7 +150,11 @@ def _show(
         else:
             name = plain(display_name(head))
             register = proposed("register", Path(head.doc_path))
-            text = f"{name}: no part number yet, so nothing to compare with; {register} gives it one"
+            text = message(
+                "{name}: no part number yet, so nothing to compare with; {register} gives it one",
+                name=name,
+                register=register,
+            )
             out.print(text, markup=False, soft_wrap=True)
         if head.part_number or diff.added:
             out.print(diff_table(diff, names, whole=not (blocking(resolved) or resolved.unresolved)))

@@ -8,6 +8,7 @@ import os
 
 from silo.bom.entry import walk_entries
 from silo.bom.errors import DocumentError, Exit, InputError, SiloError, counted
+from silo.bom.message import message
 from silo.bom.walk.document import relative
 from silo.cli.json_output import print_json
 from silo.cli.options import add_each
@@ -43,7 +44,13 @@ def run_relink(args: argparse.Namespace) -> int:
             check=_any if args.even_if_open else _closed,
         )
     if not done:
-        raise InputError(f"no link of {args.top} and its sub-assemblies records {args.old}; nothing to mend")
+        raise InputError(
+            message(
+                "no link of {top} and its sub-assemblies records {old}; nothing to mend",
+                top=args.top,
+                old=args.old,
+            )
+        )
     if args.json:
         rows = [
             {
@@ -60,8 +67,20 @@ def run_relink(args: argparse.Namespace) -> int:
     out = console()
     for relinked in done:
         links = counted(relinked.links, "link")
-        verb = "would lead" if args.dry_run else "now leads" if relinked.links == 1 else "now lead"
-        text = f"✓ {relative(relinked.path, folder)}: {links} {verb} to {relative(new, folder)}"
+        verb = (
+            message("would lead")
+            if args.dry_run
+            else message("now leads")
+            if relinked.links == 1
+            else message("now lead")
+        )
+        text = message(
+            "✓ {folder}: {links} {verb} to {folder3}",
+            folder=relative(relinked.path, folder),
+            links=links,
+            verb=verb,
+            folder3=relative(new, folder),
+        )
         out.print(plain(text), markup=False)
     return Exit.DONE
 
@@ -76,8 +95,11 @@ def _closed(path: str) -> None:
     if open_in_any().has_file(path):
         raise DocumentError(
             path,
-            "it is open in FreeCAD, and saving it there would undo the change. Close it there, or mend the "
-            "links from there (BOM in Silo, Mend links); --even-if-open writes it anyway",
+            message(
+                "it is open in FreeCAD, and saving it there would undo the change. Close it "
+                "there, or mend the links from there (BOM in Silo, Mend links); --even-if-open "
+                "writes it anyway"
+            ),
         )
 
 

@@ -8,6 +8,7 @@ import os
 from collections.abc import Mapping
 
 from silo.bom.errors import Exit, InputError, did_you_mean
+from silo.bom.message import message
 from silo.bom.walk.document import relative
 from silo.cli.json_output import print_json
 from silo.cli.options import add_each
@@ -17,7 +18,7 @@ from silo.files import documents_in
 
 
 def add_where_used(parser: argparse.ArgumentParser) -> None:
-    text = "the file; it need not be there any more"
+    text = message("the file; it need not be there any more")
     add_each(parser, "part", metavar="PART.FCStd", help=text)
 
 
@@ -26,13 +27,13 @@ def run_where_used(args: argparse.Namespace) -> int:
     from silo.vault.questions import Question
 
     if not os.path.isdir(args.root):
-        raise InputError(f"{args.root} is not a folder. Name the folder of the vault.")
+        raise InputError(message("{root} is not a folder. Name the folder of the vault.", root=args.root))
     base, part = os.path.realpath(args.root), os.path.realpath(args.part)
     if not os.path.lexists(part) and os.path.lexists(inner := os.path.join(base, args.part)):
         part = os.path.realpath(inner)  # as the other commands print it
     tops = documents_in([base])
     if part not in tops and not os.path.lexists(part) and not os.path.isdir(os.path.dirname(part)):
-        raise InputError(f"{args.part}: there is no such file, nor its folder.")
+        raise InputError(message("{part}: there is no such file, nor its folder.", part=args.part))
     users: dict[str, set[str]] = {}
     unread = []
     with reading_of(args) as reading:
@@ -47,7 +48,14 @@ def run_where_used(args: argparse.Namespace) -> int:
     if part not in users and not os.path.lexists(part):
         relative_paths = {relative(place, base) for place in (*tops, *users)}
         meant = did_you_mean(relative(part, base), sorted(relative_paths)) or "."
-        raise InputError(f"{args.part}: there is no such file, and none in {args.root} links to one{meant}")
+        raise InputError(
+            message(
+                "{part}: there is no such file, and none in {root} links to one{meant}",
+                part=args.part,
+                root=args.root,
+                meant=meant,
+            )
+        )
     above = _above(part, users)
     uses = {
         "direct": users.get(part, ()),
@@ -62,10 +70,13 @@ def run_where_used(args: argparse.Namespace) -> int:
     from silo.cli.terminal import console, plain
 
     out = console()
-    lines = said["direct"] or [f"No file of {args.root} links to it."]
+    lines = said["direct"] or [message("No file of {root} links to it.", root=args.root)]
     if said["tops"]:
-        lines.append(f"Tops that a change touches: {', '.join(said['tops'])}")
-    lines += [f"✗ {path} could not be read, so its links are not known." for path in said["unreadable"]]
+        lines.append(message("Tops that a change touches: {said}", said=", ".join(said["tops"])))
+    lines += [
+        message("✗ {path} could not be read, so its links are not known.", path=path)
+        for path in said["unreadable"]
+    ]
     for line in lines:
         out.print(plain(line), markup=False)
     return Exit.UNDONE if unread else Exit.DONE

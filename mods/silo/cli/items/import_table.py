@@ -13,6 +13,7 @@ from rich.text import Text
 
 from silo import spoken
 from silo.bom.errors import Exit, InputError
+from silo.bom.message import message
 from silo.cli.connection import client_of, named_item
 from silo.cli.json_output import print_json
 from silo.cli.options import add_options
@@ -34,12 +35,14 @@ def add_import(parser: argparse.ArgumentParser) -> None:
     add_options(
         parser,
         {
-            "--product NUMBER": "bom: the part number of the assembly whose BOM this is",
-            "--check": "show what would become of each row; change nothing",
-            "--make CODE": "make unknown parts in this category (parts: those whose own category is unknown)",
-            "--add-up": "bom: add up the rows of one part",
-            "--quantities": "bom: the quantity counts where the designators name another number",
-            "--remove": "bom: remove the lines that the file does not have",
+            "--product NUMBER": message("bom: the part number of the assembly whose BOM this is"),
+            "--check": message("show what would become of each row; change nothing"),
+            "--make CODE": message(
+                "make unknown parts in this category (parts: those whose own category is unknown)"
+            ),
+            "--add-up": message("bom: add up the rows of one part"),
+            "--quantities": message("bom: the quantity counts where the designators name another number"),
+            "--remove": message("bom: remove the lines that the file does not have"),
         },
     )
 
@@ -47,19 +50,27 @@ def add_import(parser: argparse.ArgumentParser) -> None:
 def run_import(args: argparse.Namespace) -> int:
     """Import the file, or show what would happen. 1 if rows have problems, or if something was left out."""
     if (args.product is None) is (args.kind == "bom"):
-        raise InputError("--product names the assembly of a BOM: give it with bom, and with bom alone")
+        raise InputError(
+            message("--product names the assembly of a BOM: give it with bom, and with bom alone")
+        )
     asked = {"dry_run": "true"} if args.check else {}
     names = _ASKED[args.kind]
     for option in _ASKED["bom"]:
         value = getattr(args, option)
         if value and option not in names:
-            raise InputError(f"--{option.replace('_', '-')} does nothing with {args.kind}")
+            raise InputError(
+                message(
+                    "--{option} does nothing with {kind}", option=option.replace("_", "-"), kind=args.kind
+                )
+            )
         if value:
             asked[names[option]] = value if isinstance(value, str) else "true"
     try:
         data = Path(args.file).read_bytes()
     except OSError as error:
-        raise InputError(f"{args.file!r} cannot be read: {error.strerror or error}") from error
+        raise InputError(
+            message("{file} cannot be read: {error}", file=repr(args.file), error=error.strerror or error)
+        ) from error
     with client_of(args) as client:
         if args.kind == "bom":
             answer = client.import_bom(named_item(client, args.product).part_number, data, **asked)
@@ -97,11 +108,23 @@ def _print(args: argparse.Namespace, answer: Mapping[str, Any]) -> None:
     counts = {status: sum(row["status"] == status for row in rows) for status in ("add", "change", "same")}
     left_out = sum(row["status"] == "skip" for row in rows) + len(answer.get("left_out", ()))
     wrong = sum(row["status"] == "error" for row in rows)
-    sentence = (
-        f"{counts['add']} added, {counts['change']} changed, {counts['same']} the same, {left_out} left out"
+    sentence = message(
+        "{counts} added, {counts1} changed, {counts2} the same, {left_out} left out",
+        counts=counts["add"],
+        counts1=counts["change"],
+        counts2=counts["same"],
+        left_out=left_out,
     )
-    sentence += f", {wrong} with problems" if wrong else ""
-    out.print(Text(spoken(f"{sentence}. Nothing was written." if args.check else f"{sentence}.")))
+    sentence += message(", {wrong} with problems", wrong=wrong) if wrong else ""
+    out.print(
+        Text(
+            spoken(
+                message("{sentence}. Nothing was written.", sentence=sentence)
+                if args.check
+                else f"{sentence}."
+            )
+        )
+    )
     missing = answer.get("missing", ())
     if missing and not answer.get("removed"):
         names = ", ".join(line["part_number"] for line in missing)

@@ -8,8 +8,9 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from silo import spoken
+from silo import caption, spoken
 from silo.bom.errors import Exit, InputError, SiloError
+from silo.bom.message import message
 from silo.cli.connection import client_of, named_item
 from silo.cli.json_output import print_json
 from silo.cli.options import add_each, add_options, only_with
@@ -30,13 +31,15 @@ def add_log(parser: argparse.ArgumentParser) -> None:
         help="a FreeCAD file that is registered, or a part number",
     )
     points = {
-        "--since POINT": "what changed in the product on all levels since then: a day such as 2026-02-08, "
-        "a revision of the item such as r3, or a frozen revision such as A",
-        "--until POINT": "up to then (now)",
+        "--since POINT": message(
+            "what changed in the product on all levels since then: a day such as 2026-02-08, "
+            "a revision of the item such as r3, or a frozen revision such as A"
+        ),
+        "--until POINT": message("up to then (now)"),
     }
     add_options(parser, points)
     only_with(parser, "--since", "--until")
-    add_options(parser, {"--changes": "what each revision changed in the BOM"})
+    add_options(parser, {"--changes": message("what each revision changed in the BOM")})
 
 
 def run_log(args: argparse.Namespace) -> int:
@@ -55,9 +58,13 @@ def run_log(args: argparse.Namespace) -> int:
         return Exit.DONE
     is_file = os.path.isfile(path)
     if not is_file and (os.path.isdir(path) or not _may_be_number(args.file)):
-        raise InputError(f"{args.file} is not a file. Give the path of an FCStd file, or a part number.")
+        raise InputError(
+            message("{file} is not a file. Give the path of an FCStd file, or a part number.", file=args.file)
+        )
     if args.changes and not is_file:
-        raise InputError("--changes compares BOMs from the folder of a file; give the path of an FCStd file")
+        raise InputError(
+            message("--changes compares BOMs from the folder of a file; give the path of an FCStd file")
+        )
     identity = _identity(args.file, path) if is_file else ""
     with client_of(args) as client:
         item = _item_of(client, args.file, identity) if is_file else named_item(client, args.file)
@@ -71,7 +78,7 @@ def run_log(args: argparse.Namespace) -> int:
             files = file_revisions(revisions)
             with RevisionBoms(client, item.part_number, path) as boms:
                 for number, revision in enumerate(files):
-                    set_step(f"revision {revision.revision_number}")
+                    set_step(message("revision {revision_number}", revision_number=revision.revision_number))
                     if revision.revision_number < shown[-1].revision_number:
                         break
                     older = files[number + 1].revision_number if number + 1 < len(files) else None
@@ -80,7 +87,7 @@ def run_log(args: argparse.Namespace) -> int:
                             boms.change(older, revision.revision_number)
                         )
                     except SiloError as error:
-                        changes[revision.revision_number] = f"cannot be read: {error}"
+                        changes[revision.revision_number] = message("cannot be read: {error}", error=error)
     if args.json:
         print_json(_log_json(item.part_number, shown, here, changes, args.changes))
     else:
@@ -102,14 +109,26 @@ def _identity(name: str, path: str) -> str:
         identity = identity_in(library, path)
     if not identity:
         register = proposed("register", Path(path))
-        raise InputError(f"{name} belongs to no single item in Silo; {register} gives it one")
+        raise InputError(
+            message(
+                "{name} belongs to no single item in Silo; {register} gives it one",
+                name=name,
+                register=register,
+            )
+        )
     return identity
 
 
 def _item_of(client: SiloClient, name: str, identity: str) -> Item:
     item = client.get_item_by_uuid(identity)
     if item is None:
-        raise InputError(f"{name}: this server has no item {identity}; is it the right server?")
+        raise InputError(
+            message(
+                "{name}: this server has no item {identity}; is it the right server?",
+                name=name,
+                identity=identity,
+            )
+        )
     return item
 
 
@@ -123,9 +142,14 @@ def _show_changes(args: argparse.Namespace, changes: ProductChanges) -> None:
 
     out = console()
     first, last = (when.strftime("%Y-%m-%d %H:%M") if when else "" for when in (changes.since, changes.to))
-    head = f"{changes.part_number}: what changed from {first} to {last} (UTC)"
+    head = message(
+        "{part_number}: what changed from {first} to {last} (UTC)",
+        part_number=changes.part_number,
+        first=first,
+        last=last,
+    )
     if not changes.changes:
-        out.print(f"{plain(head)}: nothing on any level", markup=False)
+        out.print(message("{head}: nothing on any level", head=plain(head)), markup=False)
         return
     out.print(Text(plain(spoken(head)), "bold"))
     table = table_of("", "Part number", "Name", "In", "Before", "After", "By")
@@ -199,18 +223,28 @@ def _show_log(
     out = console()
     out.print(Text(plain(f"{number}  {name}"), "bold"))
     if here is not None and here[0] is None:
-        out.print("This file is no revision in Silo, and it is not known which one it was made from.")
+        out.print(
+            message("This file is no revision in Silo, and it is not known which one it was made from.")
+        )
     for revision in shown:
         stamp = revision.created_at.astimezone().strftime("%Y-%m-%d %H:%M") if revision.created_at else ""
         text = Text(f"{revision.revision_number:>4}  ", "cyan")
-        text.append(f"{stamp}  {plain(revision.created_by or '')}  ", "dim")
-        text.append(plain(revision.comment) or spoken("(no comment)"))
+        text.append(
+            message("{stamp}  {created_by}  ", stamp=stamp, created_by=plain(revision.created_by or "")),
+            "dim",
+        )
+        text.append(plain(revision.comment) or caption("(no comment)"))
         if not (revision.file_name or revision.file_checksum):
-            text.append(spoken("  properties only"), "dim")
+            text.append(caption("  properties only"), "dim")
         if here is not None and revision.revision_number == here[0]:
-            text.append(spoken("  ← this file, edited since" if here[1] else "  ← this file"), "green")
+            text.append(
+                spoken(message("  ← this file, edited since") if here[1] else message("  ← this file")),
+                "green",
+            )
         out.print(text)
         if said := changes.get(revision.revision_number):
             out.print(Text(f"      {plain(spoken(said))}", "yellow"))
     if total > len(shown):
-        out.print(Text(spoken(f"… and {total - len(shown)} older; --limit shows more"), "dim"))
+        out.print(
+            Text(spoken(message("… and {shown} older; --limit shows more", shown=total - len(shown))), "dim")
+        )

@@ -31,15 +31,17 @@ def add_order(parser: argparse.ArgumentParser) -> None:
     add_options(
         parser,
         {
-            "--release LABEL": "of a released revision, such as B (else of the draft)",
-            "--spares PERCENT": "so many percent more of each part",
-            "--rest": "without what was ordered already",
-            "--supplier NAME": "only what this supplier sells",
+            "--release LABEL": message("of a released revision, such as B (else of the draft)"),
+            "--spares PERCENT": message("so many percent more of each part"),
+            "--rest": message("without what was ordered already"),
+            "--supplier NAME": message("only what this supplier sells"),
         },
     )
-    headings = ("Part number", "Name", "Needed", "Unit", "Remarks")
-    add_outputs(parser, {"--csv FILE": "write a table as CSV (- for standard output)"}, csv_table(*headings))
-    add_outputs(parser, {"--xlsx FILE": "write a table as a workbook"}, workbook(*headings))
+    headings = (message("Part number"), "Name", "Needed", "Unit", "Remarks")
+    add_outputs(
+        parser, {"--csv FILE": message("write a table as CSV (- for standard output)")}, csv_table(*headings)
+    )
+    add_outputs(parser, {"--xlsx FILE": message("write a table as a workbook")}, workbook(*headings))
     parser.set_defaults(to_standard_output=("--csv",))
     add_old_name(parser, "--revision", "--release")
     kinds = ("bought", "made", "unsaid")
@@ -78,18 +80,40 @@ def _print_order(order: OrderList) -> None:
     from silo.api.wire import SupplierPart
 
     out = console()
-    head = (
-        f"{order.part_number}: what to order for {order.pieces} with {order.spares} % spares. {order.state}"
+    head = message(
+        "{part_number}: what to order for {pieces} with {spares} % spares. {state}",
+        part_number=order.part_number,
+        pieces=order.pieces,
+        spares=order.spares,
+        state=order.state,
     )
     out.print(Text(plain(spoken(head)), "bold"))
     for warning in order.warnings:
         out.print(Text(f"⚠ {plain(spoken(warning))}", "yellow"))
-    titles = ("Part number", "Name", "Needed", "Ordered", "Quantity", "Supplier", "Its number", "Cost")
+    titles = (
+        message("Part number"),
+        "Name",
+        "Needed",
+        "Ordered",
+        "Quantity",
+        "Supplier",
+        message("Its number"),
+        "Cost",
+    )
     table = table_of("", *titles, "")
     empty = SupplierPart(supplier="", currency="")
     for part in sorted(order.parts, key=lambda part: (part.kind, (part.supplier_part or empty).supplier)):
         of = part.supplier_part or empty
-        price = f"{part.quantity or part.needed} at {part.price} {part.currency}" if part.price else ""
+        price = (
+            message(
+                "{needed} at {price} {currency}",
+                needed=part.quantity or part.needed,
+                price=part.price,
+                currency=part.currency,
+            )
+            if part.price
+            else ""
+        )
         price = price or part.quantity or ""
         cells = (
             *(spoken(part.kind), part.part_number, part.name, f"{part.needed} {part.unit or ''}"),
@@ -100,10 +124,10 @@ def _print_order(order: OrderList) -> None:
         table.add_row(*(Text(plain(cell)) for cell in cells))
     if order.parts:
         out.print(table)
-        days = "not known" if order.lead_time_days is None else counted(order.lead_time_days, "day")
+        days = message("not known") if order.lead_time_days is None else counted(order.lead_time_days, "day")
         for line in _sums(order):
             out.print(Text(plain(spoken(line))))
-        out.print(Text(plain(spoken(f"Longest lead time: {days}"))))
+        out.print(Text(plain(spoken(message("Longest lead time: {days}", days=days)))))
 
 
 def _sums(order: OrderList) -> list[Message]:

@@ -9,8 +9,9 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
-from silo import spoken
+from silo import caption, spoken
 from silo.bom.errors import Exit
+from silo.bom.message import message
 from silo.bom.quantities import plain as plain_quantity
 from silo.cli.connection import client_of, named_item
 from silo.cli.json_output import print_json, print_json_list
@@ -34,7 +35,7 @@ def run_search(args: argparse.Namespace) -> int:
     if args.json:
         print_json_list(rows)
     else:
-        _print(rows or [{"part_number": spoken("No item has these words.")}])
+        _print(rows or [{"part_number": caption("No item has these words.")}])
     return Exit.DONE if rows else Exit.UNDONE
 
 
@@ -57,7 +58,16 @@ def run_show(args: argparse.Namespace) -> int:
     if args.json:
         print_json({**head, "page": page, "bom": rows})
         return Exit.DONE
-    _print([{**head, "current_revision": spoken(f"revision {item.current_revision}")}])
+    _print(
+        [
+            {
+                **head,
+                "current_revision": spoken(
+                    message("revision {current_revision}", current_revision=item.current_revision)
+                ),
+            }
+        ]
+    )
     _print(rows)
     print(page)
     return Exit.DONE

@@ -10,6 +10,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from silo.bom.errors import AuthError, Exit, NotFoundError, PackageError, RouteMissingError
+from silo.bom.message import message
 from silo.bom_sync.activity_text import activity_text
 from silo.cli.connection import client_of, named_item
 from silo.cli.json_output import json_text
@@ -63,11 +64,15 @@ def _print_events(
             continue
         if isinstance(event, ConnectionState):
             if event.kind is Connection.UNSUPPORTED:
-                raise RouteMissingError(f"there is no live connection: {event.message}")
+                raise RouteMissingError(
+                    message("there is no live connection: {message}", message=event.message)
+                )
             if event.kind is Connection.NO_READER:
-                raise PackageError(f"{event.message}; install it with: pip install sseclient-py")
+                raise PackageError(
+                    message("{message}; install it with: pip install sseclient-py", message=event.message)
+                )
             if event.kind is Connection.REFUSED:
-                raise AuthError(f"the live connection ended: {event.message}")
+                raise AuthError(message("the live connection ended: {message}", message=event.message))
             print(f"[{event}]", file=sys.stderr)
             continue
         if event.type == "heartbeat" or (args.item and event.item != args.item):

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from silo.bom.message import message
 from silo.cli.progress import set_step
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def read_model(path: str, args: argparse.Namespace, **more: Any) -> Assembly:
 @contextmanager
 def _progress(name: str) -> Iterator[Any]:
     if not sys.stderr.isatty():
-        yield lambda progress: set_step(f"{name}: {progress}")
+        yield lambda progress: set_step(message("{name}: {progress}", name=name, progress=progress))
         return
     set_step("")  # the bar says it
     from rich.console import Console

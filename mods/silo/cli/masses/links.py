@@ -7,6 +7,7 @@ import argparse
 import sys
 
 from silo.bom.errors import Exit, InputError
+from silo.bom.message import message
 from silo.cli.json_output import json_text
 from silo.cli.masses.geometry import read_model
 from silo.cli.masses.options import add_geometry_options, check_scenes, need_inertia_extra
@@ -17,16 +18,16 @@ from silo.output_files import beginning
 
 def add_links(parser: argparse.ArgumentParser) -> None:
     add_each(parser, "assembly", "--out", "--preview", metavar="ASSEMBLY", help="a STEP, mesh or FCStd file")
-    add_options(parser, {"--urdf FILE": "give parts to links by the names in this URDF"})
+    add_options(parser, {"--urdf FILE": message("give parts to links by the names in this URDF")})
     parser.add_argument(
         "--clusters",
         type=int,
         metavar="N",
         help="make N links of parts that lie together, whatever their names",
     )
-    add_preview(parser, "write the links as a 3D scene (.glb), one colour each; may be repeated")
-    made_here = beginning("a link map", r"^---\n# Link map for |^\{\s*\"links\"")
-    add_outputs(parser, {"--out MAP": "write the map here, not to standard output"}, made_here)
+    add_preview(parser, message("write the links as a 3D scene (.glb), one colour each; may be repeated"))
+    made_here = beginning(message("a link map"), r"^---\n# Link map for |^\{\s*\"links\"")
+    add_outputs(parser, {"--out MAP": message("write the map here, not to standard output")}, made_here)
     add_geometry_options(parser)
 
 
@@ -34,9 +35,11 @@ def run_links(args: argparse.Namespace) -> int:
     """Read the geometry, group it into links, and write the map."""
     need_inertia_extra()
     if args.clusters is not None and args.clusters < 1:
-        raise InputError(f"--clusters: wanted a number of links above 0, got {args.clusters}")
+        raise InputError(
+            message("--clusters: wanted a number of links above 0, got {clusters}", clusters=args.clusters)
+        )
     if args.clusters is not None and args.urdf:
-        raise InputError("--clusters groups by position and --urdf by names; give one of them")
+        raise InputError(message("--clusters groups by position and --urdf by names; give one of them"))
     check_scenes(args)
     from silo.inertia.links.claims import ROOT_LINK, claim
     from silo.inertia.links.starting_map import as_map, as_yaml, starting_map
@@ -47,7 +50,9 @@ def run_links(args: argparse.Namespace) -> int:
     links, root = (urdf.meshes, urdf.root) if urdf is not None else (None, ROOT_LINK)
     assembly = read_model(args.assembly, args)
     if not assembly.instances:
-        raise InputError(f"{args.assembly}: holds no part, so there is nothing to give to links")
+        raise InputError(
+            message("{assembly}: holds no part, so there is nothing to give to links", assembly=args.assembly)
+        )
     start = starting_map(assembly, links, root=root, clusters=args.clusters)
     made = as_map(start, assembly)
     if args.json:
@@ -57,8 +62,11 @@ def run_links(args: argparse.Namespace) -> int:
         text = as_yaml(start, assembly)
     if claim(assembly, made).members != start.members:
         print(
-            f"silo-mod: {args.assembly}: the names of some parts make their lines match other parts as well; "
-            "look at the scene (--preview) before you use the map",
+            message(
+                "silo-mod: {assembly}: the names of some parts make their lines match other "
+                "parts as well; look at the scene (--preview) before you use the map",
+                assembly=args.assembly,
+            ),
             file=sys.stderr,
         )
     for name in args.preview:
@@ -73,5 +81,5 @@ def run_links(args: argparse.Namespace) -> int:
         write_whole(args.out, text.encode("utf-8"))
     else:
         sys.stdout.write(text)
-    print(f"{args.out or 'map'}: {start.how}.", file=sys.stderr)
+    print(message("{out}: {how}.", out=args.out or "map", how=start.how), file=sys.stderr)
     return Exit.DONE

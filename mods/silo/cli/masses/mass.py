@@ -78,7 +78,7 @@ def run_mass(args: argparse.Namespace) -> int:
     whole = LinkMap((Link(name, ("**",)),)) if assembly.instances else None
     report = calculate(assembly, table, Task(materials, options, whole, simulated=False))
     if not assembly.instances:
-        words = "the document holds no part with a shape: there is nothing to weigh"
+        words = message("the document holds no part with a shape: there is nothing to weigh")
         report.add_warning("", "", words, GeometryCode.NO_GEOMETRY)
     weightless = bool(assembly.instances) and report.total is not None and report.total.mass == 0
     if weightless:

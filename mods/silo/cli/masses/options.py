@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def add_geometry_options(parser: argparse.ArgumentParser) -> None:
     """Add the options for how files are read."""
     group = parser.add_argument_group("geometry")
-    add_options(group, {"--mesh-unit UNIT": "length unit of meshes that state none (mm, cm, m, in)"})
+    add_options(group, {"--mesh-unit UNIT": message("length unit of meshes that state none (mm, cm, m, in)")})
     group.add_argument(
         "--timeout", type=float, default=600.0, metavar="S", help="give up reading after S seconds"
     )
@@ -41,7 +41,7 @@ def add_geometry_options(parser: argparse.ArgumentParser) -> None:
     add_options(
         group,
         {
-            "--no-siblings": "do not look for the files of split assemblies",
+            "--no-siblings": message("do not look for the files of split assemblies"),
         },
     )
 
@@ -52,8 +52,8 @@ def add_material_options(parser: argparse.ArgumentParser) -> None:
     add_options(
         group,
         {
-            "--materials FILE...": "your own densities (.csv or .toml)",
-            "--no-freecad-materials": "do not look into an installed FreeCAD's cards",
+            "--materials FILE...": message("your own densities (.csv or .toml)"),
+            "--no-freecad-materials": message("do not look into an installed FreeCAD's cards"),
         },
     )
 
@@ -64,30 +64,32 @@ def add_bom_options(parser: argparse.ArgumentParser) -> None:
     add_options(
         group,
         {
-            "--bom BOM": "CSV, XLSX, XLS or ODS; names, masses or materials",
+            "--bom BOM": message("CSV, XLSX, XLS or ODS; names, masses or materials"),
             "--column ROLE=HEADER...": (
-                "a renamed column; roles: name, part_number, description, material, mass, total_mass,"
-                " mass_unit, quantity, item, level, find_number"
+                message(
+                    "a renamed column; roles: name, part_number, description, material, mass, "
+                    "total_mass, mass_unit, quantity, item, level, find_number"
+                )
             ),
         },
     )
     group.add_argument("--encoding", help="of the BOM, for example cp1252")
     group.add_argument("--delimiter", help="of the BOM, one character")
     group.add_argument("--decimal", choices=(".", ","), help="decimal mark of the BOM")
-    add_options(group, {"--mass-unit UNIT": "of masses without one (kg, g, lb, …)"})
+    add_options(group, {"--mass-unit UNIT": message("of masses without one (kg, g, lb, …)")})
     only_with(parser, "--bom", "--column", "--encoding", "--delimiter", "--decimal", "--mass-unit")
 
 
 def add_result_options(parser: argparse.ArgumentParser) -> None:
     """Add the options for where results go, and when a warning is a failure."""
     group = parser.add_argument_group("results")
-    text = "write a 3D scene (.glb) with centres of mass and inertia ellipsoids; may be repeated"
+    text = message("write a 3D scene (.glb) with centres of mass and inertia ellipsoids; may be repeated")
     add_preview(parser, text, group)
     add_options(
         group,
         {
-            "--strict": "exit 1 where there is any warning",
-            "--allow CODE...": "with --strict: this warning is fine",
+            "--strict": message("exit 1 where there is any warning"),
+            "--allow CODE...": message("with --strict: this warning is fine"),
         },
     )
     only_with(parser, "--strict", "--allow")
@@ -99,8 +101,8 @@ def add_push_options(parser: argparse.ArgumentParser) -> None:
     add_options(
         group,
         {
-            "--push": "write mass, volume and centre of mass into the items' properties",
-            "--dry-run": "with --push: only show what would be written",
+            "--push": message("write mass, volume and centre of mass into the items' properties"),
+            "--dry-run": message("with --push: only show what would be written"),
         },
     )
     only_with(parser, "--push", "--dry-run", "--item", "--server", "--token")
@@ -111,8 +113,11 @@ def need_inertia_extra() -> None:
     missing = [name for name in ("numpy", "OCP", "trimesh", "yaml") if find_spec(name) is None]
     if missing:
         raise ConfigError(
-            f"mass and inertia need the packages of the extra “inertia” ({', '.join(missing)} not found); "
-            "install them with: pip install 'silo-mod[inertia]'"
+            message(
+                "mass and inertia need the packages of the extra “inertia” ({missing} not "
+                "found); install them with: pip install 'silo-mod[inertia]'",
+                missing=", ".join(missing),
+            )
         )
 
 
@@ -120,7 +125,7 @@ def bom_table(args: argparse.Namespace) -> BomTable | None:
     """Read the BOM that the user's options name; None if they name none."""
     from silo.inertia.bom.parser import BOMParser
 
-    columns = named_values(args.column, "--column", "ROLE=HEADER, for example mass=Gewicht")
+    columns = named_values(args.column, "--column", message("ROLE=HEADER, for example mass=Gewicht"))
     delimiter = "\t" if args.delimiter in ("\\t", "tab") else args.delimiter
     parser = BOMParser(
         columns=columns,
@@ -134,7 +139,9 @@ def bom_table(args: argparse.Namespace) -> BomTable | None:
 
 def named_values(texts: Sequence[str], option: str, wanted: str) -> dict[str, str]:
     if bad := [text for text in texts if "=" not in text]:
-        raise InputError(f"{option} wants {wanted}; got “{bad[0]}”")
+        raise InputError(
+            message("{option} wants {wanted}; got “{bad}”", option=option, wanted=wanted, bad=bad[0])
+        )
     return {name.strip(): value.strip() for name, _, value in (text.partition("=") for text in texts)}
 
 
@@ -165,7 +172,9 @@ def check_options(args: argparse.Namespace, *, asks_server: bool) -> None:
     if args.default_density is not None:
         checked_density(args.default_density)
     if not (args.timeout >= 0 and math.isfinite(args.timeout)):
-        raise InputError(f"--timeout: wanted seconds, 0 for no limit, got {args.timeout:g}")
+        raise InputError(
+            message("--timeout: wanted seconds, 0 for no limit, got {timeout}", timeout=f"{args.timeout:g}")
+        )
     if asks_server:
         from silo.api.config import resolve_server
 
@@ -176,4 +185,8 @@ def check_options(args: argparse.Namespace, *, asks_server: bool) -> None:
 def check_scenes(args: argparse.Namespace) -> None:
     """Raise InputError for scenes whose names do not end in .glb."""
     if bad := [name for name in args.preview if Path(name).suffix.lower() != ".glb"]:
-        raise InputError(f"--preview writes .glb, --report FILE.html a page to look at; got {', '.join(bad)}")
+        raise InputError(
+            message(
+                "--preview writes .glb, --report FILE.html a page to look at; got {bad}", bad=", ".join(bad)
+            )
+        )

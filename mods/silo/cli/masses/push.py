@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from silo.bom.errors import Exit, counted
+from silo.bom.message import message
 from silo.cli.connection import client_of
 from silo.cli.progress import set_step
 
@@ -28,16 +29,22 @@ def push_report(
         _tell_plan(plan)
         return Exit.DONE
     with client_of(args) as client:
-        set_step("writing masses")
+        set_step(message("writing masses"))
         done = push(client, plan)
     written = counted(len(done.written), "item")
-    _say(f"Silo: {written} written, {len(done.unchanged)} had these numbers already.")
+    _say(
+        message(
+            "Silo: {written} written, {count} had these numbers already.",
+            written=written,
+            count=len(done.unchanged),
+        )
+    )
     if done.by_hand:
-        _say(f"Typed by hand or weighed, so it stays: {', '.join(done.by_hand)}")
+        _say(message("Typed by hand or weighed, so it stays: {by_hand}", by_hand=", ".join(done.by_hand)))
     if done.unknown:
-        _say(f"Unknown to the server: {', '.join(done.unknown)}")
+        _say(message("Unknown to the server: {unknown}", unknown=", ".join(done.unknown)))
     for number, error in done.failed:
-        _say(f"Not written: {number}: {error}")
+        _say(message("Not written: {number}: {error}", number=number, error=error))
     _tell_skipped(plan)
     return Exit.REMOTE if done.failed else Exit.UNDONE if done.unknown else Exit.DONE
 
@@ -45,15 +52,19 @@ def push_report(
 def _tell_plan(plan: PushPlan) -> None:
     from silo.inertia.push import describe
 
-    _say(f"Would write {counted(len(plan.items), 'item')} ({plan.comment}):")
+    _say(
+        message(
+            "Would write {plan} ({comment}):", plan=counted(len(plan.items), "item"), comment=plan.comment
+        )
+    )
     for item in plan.items:
-        _say(f"  {describe(item)}")
+        _say(message("  {item}", item=describe(item)))
     _tell_skipped(plan)
 
 
 def _tell_skipped(plan: PushPlan) -> None:
     for skipped in plan.skipped:
-        _say(f"Not written: {skipped.name}: {skipped.reason}")
+        _say(message("Not written: {name}: {reason}", name=skipped.name, reason=skipped.reason))
 
 
 def _say(text: str) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from silo import spoken
 from silo.bom.errors import Exit, counted
+from silo.bom.message import message
 
 if TYPE_CHECKING:
     from silo.inertia.assembly import Assembly
@@ -73,7 +74,7 @@ def verdict(args: argparse.Namespace, report: InertiaReport) -> int:
         if w.code not in args.allow and (args.strict or w.code == GeometryCode.NOT_READ)
     ]
     if left:
-        why = "--strict" if args.strict else "what cannot be read is in no mass"
+        why = "--strict" if args.strict else message("what cannot be read is in no mass")
         count, codes = counted(len(left), "warning"), ", ".join(sorted({*left}))
         print(f"silo-mod: {why}: {count} ({codes})", file=sys.stderr)
     return Exit.UNDONE if left else Exit.DONE

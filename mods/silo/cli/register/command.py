@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from silo.bom.entry import Extraction, walk_entries
 from silo.bom.errors import Exit, InputError
+from silo.bom.message import message
 from silo.bom.view.folders import base_folder
 from silo.bom.walk.document import relative
 from silo.cli.connection import client_of
@@ -42,10 +43,12 @@ def add_register(parser: argparse.ArgumentParser) -> None:
     add_options(
         how,
         {
-            "--yes": "take every proposal without asking",
+            "--yes": message("take every proposal without asking"),
             "--adopt": (
-                "take over what was registered on another server: an item for each identity that this"
-                " server does not know, with the same UUID"
+                message(
+                    "take over what was registered on another server: an item for each identity that "
+                    "this server does not know, with the same UUID"
+                )
             ),
         },
     )
@@ -57,8 +60,10 @@ def add_register(parser: argparse.ArgumentParser) -> None:
     add_options(
         how,
         {
-            "--plan FILE": "write the proposals as a table (CSV) to edit; no more (- for standard output)",
-            "--apply FILE": "register what an edited table says",
+            "--plan FILE": message(
+                "write the proposals as a table (CSV) to edit; no more (- for standard output)"
+            ),
+            "--apply FILE": message("register what an edited table says"),
         },
     )
     declare_output(parser, "--plan", NEW)
@@ -81,18 +86,28 @@ def add_register(parser: argparse.ArgumentParser) -> None:
         parser,
         {
             "--declare OBJECT...": (
-                "count what is modelled in the assembly's own file (name or label); equal copies are one item"
+                message(
+                    "count what is modelled in the assembly's own file (name or label); equal copies "
+                    "are one item"
+                )
             ),
-            "--apart": "with --declare: an item for each copy",
+            "--apart": message("with --declare: an item for each copy"),
             "--undeclare OBJECT...": (
-                "take back a decision about an object in the assembly's own file: its identity, whose"
-                " item stays, or that it is no part"
+                message(
+                    "take back a decision about an object in the assembly's own file: its identity, "
+                    "whose item stays, or that it is no part"
+                )
             ),
             "--not-a-part OBJECT...": (
-                "say of what is modelled in the assembly's own file that it is no part; the file keeps that"
+                message(
+                    "say of what is modelled in the assembly's own file that it is no part; the file "
+                    "keeps that"
+                )
             ),
-            "--count OBJECT...": "count a hidden object (name or label); the file keeps that",
-            "--reference OBJECT...": "say of a hidden object that it counts nowhere; the file keeps that",
+            "--count OBJECT...": message("count a hidden object (name or label); the file keeps that"),
+            "--reference OBJECT...": message(
+                "say of a hidden object that it counts nowhere; the file keeps that"
+            ),
         },
     )
     parser.add_argument("--category", help="this category for every part (assemblies keep theirs)")
@@ -113,15 +128,19 @@ def run_register(args: argparse.Namespace) -> int:
     decided = args.count or args.reference
     if not (args.yes or args.adopt or args.plan or args.apply or taken or decided or sys.stdin.isatty()):
         raise InputError(
-            "register asks before it creates items, and there is nobody to ask here; say --yes, "
-            "or write a table with --plan FILE, edit it, and use it with --apply FILE"
+            message(
+                "register asks before it creates items, and there is nobody to ask here; say "
+                "--yes, or write a table with --plan FILE, edit it, and use it with --apply FILE"
+            )
         )
     if args.plan and args.json:
-        raise InputError("--plan writes a table and no JSON; leave out --json")
+        raise InputError(message("--plan writes a table and no JSON; leave out --json"))
     if (args.declare or taken or decided) and (args.plan or args.apply or os.path.isdir(args.top)):
         raise InputError(
-            "--declare, --undeclare, --not-a-part, --count and --reference are for one file, and not for a"
-            " table"
+            message(
+                "--declare, --undeclare, --not-a-part, --count and --reference are for one file, "
+                "and not for a table"
+            )
         )
     if decided:
         return decide_hidden(args)
@@ -136,7 +155,11 @@ def run_register(args: argparse.Namespace) -> int:
         if table.unused:
             from silo.cli.terminal import plain
 
-            words = f"{args.apply}: these columns are not used: {', '.join(table.unused)}"
+            words = message(
+                "{apply}: these columns are not used: {unused}",
+                apply=args.apply,
+                unused=", ".join(table.unused),
+            )
             print(f"silo-mod: {plain(words)}", file=sys.stderr)
     extraction, unused, unread = _read(args)
     base = os.path.realpath(args.top) if os.path.isdir(args.top) else base_folder(extraction)
@@ -146,7 +169,14 @@ def run_register(args: argparse.Namespace) -> int:
         warn_of_rules(offer_made.categories)
         if args.category and args.category not in offer_made.categories:
             text = ", ".join(offer_made.categories)
-            raise InputError(f"--category: schema {schema} has no {args.category}; it has {text}")
+            raise InputError(
+                message(
+                    "--category: schema {schema} has no {category}; it has {text}",
+                    schema=schema,
+                    category=args.category,
+                    text=text,
+                )
+            )
         code = RegisterRun(args, client, schema, offer_made, base).as_asked(rows, unused)
         return code or (Exit.UNDONE if unread else Exit.DONE)
 
@@ -158,7 +188,10 @@ def _read(args: argparse.Namespace) -> tuple[Extraction, frozenset[str], bool]:
         return extraction, frozenset(), _tell_missing(extraction, base_folder(extraction))
     with plan_of(args) as (plan, reading, base):
         for path, error in plan.errors.items():
-            print(f"silo-mod: {relative(path, base)} is left out: {error}", file=sys.stderr)
+            print(
+                message("silo-mod: {base} is left out: {error}", base=relative(path, base), error=error),
+                file=sys.stderr,
+            )
         extraction, unused = whole_folder(plan, reading, base, hardware=not args.no_hardware)
         return extraction, unused, _tell_missing(extraction, base) or bool(plan.errors)
 
@@ -169,7 +202,10 @@ def _tell_missing(extraction: Extraction, base: str) -> bool:
 
     missing = {entry.doc_path for entry in walk_entries(extraction.entries) if entry.missing}
     for path in sorted(missing):
-        print(f"silo-mod: {plain(relative(path, base))} is left out: it is not there", file=sys.stderr)
+        print(
+            message("silo-mod: {base} is left out: it is not there", base=plain(relative(path, base))),
+            file=sys.stderr,
+        )
     return bool(missing)
 
 
@@ -190,7 +226,10 @@ def _offer(extraction: Extraction, client: SiloClient, schema: str, args: argpar
     )
     if offer_made.unsearched:
         print(
-            f"silo-mod: Silo was not searched for probable duplicates: {offer_made.unsearched}",
+            message(
+                "silo-mod: Silo was not searched for probable duplicates: {unsearched}",
+                unsearched=offer_made.unsearched,
+            ),
             file=sys.stderr,
         )
     candidates = [

@@ -33,8 +33,10 @@ def declare(args: argparse.Namespace) -> int:
     wanted = chosen(articles, args.declare, apart=args.apart)
     for part in wanted:
         if part.decided:
-            what = "no part, as somebody said" if part.no_part else "a component already"
-            raise InputError(f"{part.entry.label} is {what}; --undeclare takes that back")
+            what = message("no part, as somebody said") if part.no_part else message("a component already")
+            raise InputError(
+                message("{label} is {what}; --undeclare takes that back", label=part.entry.label, what=what)
+            )
     with client_of(args) as client:
         schema = client.find_schema(args.schema)
         categories = client.categories(schema)
@@ -72,9 +74,12 @@ def undeclare(args: argparse.Namespace) -> int:
     if args.json:
         print_json({"undeclared": taken})
     elif no_part:
-        print(spoken(f"No part of any BOM: {', '.join(taken)} (SiloBomExclude)."))
+        print(spoken(message("No part of any BOM: {taken} (SiloBomExclude).", taken=", ".join(taken))))
     else:
-        text = f"Undecided again: {', '.join(taken)}. The next sync flags a line of it as unreferenced."
+        text = message(
+            "Undecided again: {taken}. The next sync flags a line of it as unreferenced.",
+            taken=", ".join(taken),
+        )
         print(spoken(text))
     return Exit.DONE
 

@@ -8,6 +8,7 @@ import os
 import sys
 
 from silo.bom.errors import Exit
+from silo.bom.message import message
 from silo.cli.connection import client_of
 from silo.cli.json_output import print_json
 from silo.cli.terminal import plain
@@ -35,6 +36,8 @@ def orphans(args: argparse.Namespace) -> int:
     for row in rows if not args.json else ():
         print(*map(plain, (row["part_number"], row["name"], row["component"])), sep="  ")
     if rows and not done:
-        words = "registering these files again takes the items; --orphans archive puts them out of use"
+        words = message(
+            "registering these files again takes the items; --orphans archive puts them out of use"
+        )
         print(f"silo-mod: {words}", file=sys.stderr)
     return Exit.UNDONE if rows and not done else Exit.DONE

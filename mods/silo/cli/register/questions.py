@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import Any
 
 from silo.bom.errors import InputError, SiloError
+from silo.bom.message import message
 from silo.bom.walk.document import relative
 from silo.cli.progress import set_step
 from silo.cli.terminal import plain
@@ -21,16 +22,17 @@ from silo.registering.offer import Offer
 from silo.registering.request import ITEM_TYPES, RegistrationRequest, find_item, wrong_name
 from silo.registering.table import doubts, remarks
 
-_HELP = """  y, yes        register it as shown; Enter alone does the same where there is no doubt
-  n, no         leave it out; it stays without a number
-  name TEXT     give it another name
-  type TYPE     part, assembly, consumable or tool
-  cat CODE      another category; cat alone lists them all, cat WORD those with the word
-  join NUMBER   it is this item of Silo already: take its number, make no new one
-  all           register this one and the others, and ask only where there is a doubt
-  q, quit       ask no more: what you said yes to is registered, the rest is left out
-  ?             this list
-Nothing is registered before the last question. Ctrl-C leaves everything as it was."""
+_HELP = message(
+    "  y, yes        register it as shown; Enter alone does the same where there is "
+    "no doubt\n  n, no         leave it out; it stays without a number\n  name "
+    "TEXT     give it another name\n  type TYPE     part, assembly, consumable or "
+    "tool\n  cat CODE      another category; cat alone lists them all, cat WORD those "
+    "with the word\n  join NUMBER   it is this item of Silo already: take its number, "
+    "make no new one\n  all           register this one and the others, and ask only "
+    "where there is a doubt\n  q, quit       ask no more: what you said yes to is "
+    "registered, the rest is left out\n  ?             this list\nNothing is "
+    "registered before the last question. Ctrl-C leaves everything as it was."
+)
 
 
 def read_line(prompt: str) -> str | None:
@@ -96,11 +98,11 @@ class Dialog:
         where = entry.standard or f"{relative(entry.doc_path, self._base)}#{entry.object_name}"
         _say(f"\n[{number + 1}/{len(self._candidates)}] {where}")
         for remark in remarks(candidate, self._earlier):
-            _say(f"  ⚠ {remark}")
+            _say(message("  ⚠ {remark}", remark=remark))
         yes = "y" if doubtful else "Y"
         while True:
-            _say(f"  {self._described(request)}")
-            answer = self._read(f"  register it? [{yes}/n/name/type/cat/join/all/q/?] ")
+            _say(message("  {request}", request=self._described(request)))
+            answer = self._read(message("  register it? [{yes}/n/name/type/cat/join/all/q/?] ", yes=yes))
             word, _, rest = ("q" if answer is None else answer.strip()).partition(" ")
             match word.lower(), rest.strip():
                 case (("q" | "quit"), ""):
@@ -114,19 +116,31 @@ class Dialog:
                     self._all = self._all or bool(said)
                     if not doubtful:
                         return request
-                    _say("  There is a doubt (⚠): please answer y or n, or join NUMBER.")
+                    _say(message("  There is a doubt (⚠): please answer y or n, or join NUMBER."))
                 case (("?" | "h" | "help"), _):
                     _say(_HELP)
                 case ("name" | "type" | "cat" | "join") as what, text:
                     request = self._changed(request, what, text)
                 case _:
-                    _say(f"  {answer!r} is no answer; ? lists what can be answered.")
+                    _say(
+                        message("  {answer} is no answer; ? lists what can be answered.", answer=repr(answer))
+                    )
 
     def _described(self, request: RegistrationRequest) -> str:
         if request.existing is not None:
-            return f"join {request.existing.part_number} {request.existing.name!r}"
+            return message(
+                "join {part_number} {name}",
+                part_number=request.existing.part_number,
+                name=repr(request.existing.name),
+            )
         meaning = self._found.categories.get(request.category, "")
-        return f"{request.item_type} {request.name!r}, category {request.category} ({meaning})"
+        return message(
+            "{item_type} {name}, category {category} ({meaning})",
+            item_type=request.item_type,
+            name=repr(request.name),
+            category=request.category,
+            meaning=meaning,
+        )
 
     def _changed(self, request: RegistrationRequest, what: str, text: str) -> RegistrationRequest:
         """Return the request with the change; if it is not possible, explain that and return the request
@@ -134,22 +148,22 @@ class Dialog:
         """
         if what == "name":
             if problem := wrong_name(text, request.candidate):
-                _say(f"  {problem}")
+                _say(message("  {problem}", problem=problem))
                 return request
             return replace(request, name=text)
         if what == "type":
             if text.lower() in ITEM_TYPES:
                 return request.retyped(text.lower(), self._found.categories)
-            _say(f"  type: one of {', '.join(ITEM_TYPES)}")
+            _say(message("  type: one of {item_types}", item_types=", ".join(ITEM_TYPES)))
             return request
         if what == "cat":
             return self._category(request, text)
         try:
             return replace(request, existing=find_item(text, request.candidate, self._api) if text else None)
         except InputError as problem:
-            _say(f"  {problem}")
+            _say(message("  {problem}", problem=problem))
         except SiloError as error:
-            _say(f"  Silo cannot say: {error}")
+            _say(message("  Silo cannot say: {error}", error=error))
         return request
 
     def _category(self, request: RegistrationRequest, text: str) -> RegistrationRequest:
@@ -162,7 +176,7 @@ class Dialog:
             code for code, words in categories.items() if text.casefold() in f"{code} {words}".casefold()
         ]
         if not codes:
-            _say(f"  There is no category {text!r}; cat alone lists them all.")
+            _say(message("  There is no category {text}; cat alone lists them all.", text=repr(text)))
         for code in codes:
             _say(f"    {code}  {categories[code]}")
         return request

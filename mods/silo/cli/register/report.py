@@ -8,6 +8,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from silo.bom.message import message
 from silo.bom.walk.document import relative
 from silo.cli.json_output import print_json
 from silo.cli.proposals import proposed_again
@@ -36,17 +37,25 @@ def article_json(article: Modelled, base: str) -> Mapping[str, Any]:
 
 def articles_text(args: argparse.Namespace, articles: Sequence[Modelled], base: str) -> list[str]:
     """Write the section about what is modelled in the file, line by line."""
-    lines = ["Modelled in this file, not counted:"]
+    lines: list[str] = [message("Modelled in this file, not counted:")]
     most = _MOST_MODELLED if sys.stdout.isatty() else len(articles)
     for article in articles[:most]:
-        copies = f", {len(article.objects)} copies of one {article.alike}" if len(article.objects) > 1 else ""
-        source = f", imported from {plain(relative(article.source, base))}" if article.source else ""
+        copies = (
+            message(", {count} copies of one {alike}", count=len(article.objects), alike=article.alike)
+            if len(article.objects) > 1
+            else ""
+        )
+        source = (
+            message(", imported from {base}", base=plain(relative(article.source, base)))
+            if article.source
+            else ""
+        )
         label = plain(article.entry.label)
         lines.append(f"  {article.entry.quantity} × {label} ({article.entry.object_name}{copies}{source})")
     if len(articles) > most:
-        lines.append(f"  and {len(articles) - most} more; --json has them all")
+        lines.append(message("  and {count} more; --json has them all", count=len(articles) - most))
     first = proposed_again(args, "--yes", "--declare", articles[0].entry.object_name)
-    lines.append(f"Declare what is a part, such as the first: {first}")
+    lines.append(message("Declare what is a part, such as the first: {first}", first=first))
     return lines
 
 
@@ -92,27 +101,46 @@ def registrations(
         return
     out = console()
     if not done and not left:
-        out.print("Every component has its part number already.")
+        out.print(message("Every component has its part number already."))
     for result in done:
         name = plain(result.proposal.name)
         if result.error is None:
-            guess = " (the category is a guess)" if result.proposal.is_guess else ""
-            note = " (the item was there already)" if result.found else ""
-            out.print(f"✓ {result.part_number}  {name}{guess}{note}", markup=False)
+            guess = message(" (the category is a guess)") if result.proposal.is_guess else ""
+            note = message(" (the item was there already)") if result.found else ""
+            out.print(
+                message(
+                    "✓ {part_number}  {name}{guess}{note}",
+                    part_number=result.part_number,
+                    name=name,
+                    guess=guess,
+                    note=note,
+                ),
+                markup=False,
+            )
         else:
-            out.print(f"✗ {name}: {plain(str(result.error))}", style="red", markup=False)
+            out.print(
+                message("✗ {name}: {error}", name=name, error=plain(str(result.error))),
+                style="red",
+                markup=False,
+            )
     for proposal, why in left:
         where = proposal.entry.standard or relative(proposal.entry.doc_path, base)
-        reason = f" ({plain(why)})" if why else ""
-        text = f"⚠ {plain(where)}: unregistered, left out of the BOM{reason}"
+        reason = message(" ({why})", why=plain(why)) if why else ""
+        text = message(
+            "⚠ {where}: unregistered, left out of the BOM{reason}", where=plain(where), reason=reason
+        )
         out.print(text, style="yellow", markup=False)
     if any(proposal.entry.silo_uuid and not proposal.entry.is_standard for proposal, _ in left):
         adopt = proposed_again(args, "--adopt")
-        out.print(f"Are these parts of another server? {adopt} takes them over.", markup=False)
+        out.print(
+            message("Are these parts of another server? {adopt} takes them over.", adopt=adopt), markup=False
+        )
     if args.yes and any(why for _, why in left):
         out.print(
-            "Is it the same part? --duplicates join takes the item, --duplicates new makes another; "
-            "--plan asks for each."
+            message(
+                "Is it the same part? --duplicates join takes the item, --duplicates new makes "
+                "another; --plan asks for each."
+            )
         )
     for line in articles_text(args, articles, base) if articles else ():
         out.print(line, markup=False, highlight=False)

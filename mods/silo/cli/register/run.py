@@ -10,9 +10,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from silo import spoken
+from silo import caption, spoken
 from silo.bom.errors import ConflictError, Exit, counted
 from silo.bom.items.proposal import Proposal
+from silo.bom.message import message
 from silo.cli.progress import set_step
 from silo.cli.proposals import proposed_again
 from silo.cli.register.questions import Dialog
@@ -91,8 +92,12 @@ class RegisterRun:
             file.write(table)
         count = sum(not component.decided for component in self.found.candidates)
         print(
-            f"{self.args.plan}: {counted(count, 'row')}. Edit it, then: "
-            f"{proposed_again(self.args, '--apply', Path(self.args.plan))}",
+            message(
+                "{plan}: {count}. Edit it, then: {plan2}",
+                plan=self.args.plan,
+                count=counted(count, "row"),
+                plan2=proposed_again(self.args, "--apply", Path(self.args.plan)),
+            ),
             file=sys.stderr,
         )
         return Exit.DONE
@@ -119,7 +124,9 @@ class RegisterRun:
                 left.append(candidate)
         if unused:
             files = counted(len(unused), "file")
-            words = f"{files} that no assembly uses: left alone (name the file, or use --plan)"
+            words = message(
+                "{files} that no assembly uses: left alone (name the file, or use --plan)", files=files
+            )
             print(words, file=sys.stderr)
         return requests, left
 
@@ -161,7 +168,11 @@ class RegisterRun:
             [article for article in articles if article.entry.key not in declared],
         )
         if already and not self.args.json:
-            print(spoken(f"{already} of the table's components had their number already."))
+            print(
+                spoken(
+                    message("{already} of the table's components had their number already.", already=already)
+                )
+            )
 
 
 def _asker(how: str) -> Ask:
@@ -178,12 +189,17 @@ def _asker(how: str) -> Ask:
             try:
                 return unclear(proposal, matches)
             except ConflictError as error:
-                raise ConflictError(f"{error}: --unclear take, or --unclear new") from None
-        print(f"{proposal.name}: is it one of these items? A copy of it is not.", file=sys.stderr)
+                raise ConflictError(
+                    message("{error}: --unclear take, or --unclear new", error=error)
+                ) from None
+        print(
+            message("{name}: is it one of these items? A copy of it is not.", name=proposal.name),
+            file=sys.stderr,
+        )
         for number, item in enumerate(matches, start=1):
             print(f"  {number}  {item['part_number']}  {item.get('created_at') or ''}", file=sys.stderr)
         set_step("")
-        answer = input(spoken("which one is it? [number, n = make a new item] ")).strip()
+        answer = input(caption("which one is it? [number, n = make a new item] ")).strip()
         if answer.isdecimal() and 1 <= int(answer) <= len(matches):
             return matches[int(answer) - 1]
         return None if answer.lower() == "n" else unclear(proposal, matches)

@@ -24,6 +24,7 @@ from silo.batch import source_document
 from silo.bom.consolidation import consolidation_findings
 from silo.bom.entry import Extraction
 from silo.bom.errors import Exit, InputError, ServerFaultError
+from silo.bom.message import message
 from silo.bom.view.folders import base_folder
 from silo.bom_sync.activity_text import activity_text
 from silo.bom_sync.resolved import resolve
@@ -58,7 +59,7 @@ EVENT_SECONDS = 20.0
 
 def add_demo(parser: argparse.ArgumentParser) -> None:
     """Add the command."""
-    add_options(parser, {"--keep": "leave the server running until Ctrl-C"})
+    add_options(parser, {"--keep": message("leave the server running until Ctrl-C")})
     parser.add_argument("--port", type=int, default=0, help="port of the server (default: a free one)")
     parser.set_defaults(waits=True)
 
@@ -67,7 +68,7 @@ def run_demo(args: argparse.Namespace) -> int:
     """Run the demo."""
     need_server_extra()
     if not (EXAMPLE / TOP).is_file():
-        raise InputError(f"the example {EXAMPLE / TOP} is not there; install silo-mod again")
+        raise InputError(message("the example {top} is not there; install silo-mod again", top=EXAMPLE / TOP))
     with ExitStack() as stack:
         folder = Path(stack.enter_context(scratch_folder("silo-demo-")))
         stack.enter_context(_private_data(folder / "data"))
@@ -136,17 +137,21 @@ class Demo:
     def say(self, text: str) -> None:
         self.step += 1
         self.out.print()
-        self.out.rule(f"[bold]{self.step}  {spoken(text)}", align="left")
+        self.out.rule(message("[bold]{step}  {text}", step=self.step, text=spoken(text)), align="left")
 
     def play(self) -> None:
         """Play all steps."""
-        self.out.print(f"Silo server on {self.client.base_url}, database in a temporary folder.")
-        extraction = self._read("Read the assembly from its files")
+        self.out.print(
+            message(
+                "Silo server on {base_url}, database in a temporary folder.", base_url=self.client.base_url
+            )
+        )
+        extraction = self._read(message("Read the assembly from its files"))
         self._register(extraction)
-        self._sync("First sync: sub-assemblies before their parents")
-        self._sync("Second sync: nothing changed, nothing is sent")
+        self._sync(message("First sync: sub-assemblies before their parents"))
+        self._sync(message("Second sync: nothing changed, nothing is sent"))
         self._edit()
-        self._sync("Third sync")
+        self._sync(message("Third sync"))
         self._finish()
 
     def _read(self, title: str) -> Extraction:
@@ -158,7 +163,7 @@ class Demo:
         return extraction
 
     def _register(self, extraction: Extraction) -> None:
-        self.say("Register the components; one is left without a number")
+        self.say(message("Register the components; one is left without a number"))
         proposals = [
             p
             for p in proposals_for(extraction, self.client, "kindred-rd")
@@ -167,7 +172,10 @@ class Demo:
         for done in register_all(proposals, self.client, schema="kindred-rd"):
             if done.error is not None:
                 raise done.error
-            self.out.print(f"✓ {done.part_number}  {done.proposal.name}", markup=False)
+            self.out.print(
+                message("✓ {part_number}  {name}", part_number=done.part_number, name=done.proposal.name),
+                markup=False,
+            )
 
     def _sync(self, title: str) -> list[Outcome]:
         self.say(title)
@@ -193,8 +201,12 @@ class Demo:
                 event = self.events.get(timeout=EVENT_SECONDS)
             except queue.Empty:
                 raise ServerFaultError(
-                    f"the server merged {outcome.assembly.part_number}, but its event did not arrive "
-                    f"within {EVENT_SECONDS:g} s"
+                    message(
+                        "the server merged {part_number}, but its event did not arrive within "
+                        "{event_seconds} s",
+                        part_number=outcome.assembly.part_number,
+                        event_seconds=f"{EVENT_SECONDS:g}",
+                    )
                 ) from None
             is_top = outcome is outcomes[-1]
             box = activity_text(
@@ -206,28 +218,43 @@ class Demo:
             self.out.print(activity_box(box))
 
     def _edit(self) -> None:
-        self.say("Edit: the cover goes, four more bolts come, a person adds glue in Silo")
+        self.say(message("Edit: the cover goes, four more bolts come, a person adds glue in Silo"))
         remove_from_assembly(self.top, "Cover")
         before, after = set_element_count(self.top, "CoverBolts", added=4)
         number = resolve(read_assembly(str(self.top)), self.client).assembly.part_number or ""
-        glue = self.client.create_item("kindred-rd", "C01", "Thread locker", item_type="consumable")
+        glue = self.client.create_item("kindred-rd", "C01", message("Thread locker"), item_type="consumable")
         self.client.add_bom_line(number, glue.part_number, quantity=1)
-        self.out.print("- Cover removed from the assembly")
-        self.out.print(f"~ cover bolts, a link array: {before} → {after} elements")
-        self.out.print(f"✎ {glue.part_number} Thread locker added to {number} by hand, on the server")
+        self.out.print(message("- Cover removed from the assembly"))
+        self.out.print(
+            message("~ cover bolts, a link array: {before} → {after} elements", before=before, after=after)
+        )
+        self.out.print(
+            message(
+                "✎ {part_number} Thread locker added to {number} by hand, on the server",
+                part_number=glue.part_number,
+                number=number,
+            )
+        )
 
     def _finish(self) -> None:
         number = resolve(read_assembly(str(self.top)), self.client).assembly.part_number or ""
         self.page = self.client.web_url(f"/items/{number}/bom")
         self.out.print()
-        self.out.print(f"The page where a person decides: {self.page}", markup=False)
+        self.out.print(message("The page where a person decides: {page}", page=self.page), markup=False)
 
     def stay(self) -> None:
         """Leave the server running, so that people can look at it."""
         if self.login_url:
             path = self.page.removeprefix(self.client.base_url)
-            self.out.print(f"Look at it logged in: {self.login_url}?next={quote(path)}", markup=False)
-        self.out.print("The server runs until Ctrl-C; its data is then removed.")
+            self.out.print(
+                message(
+                    "Look at it logged in: {login_url}?next={path}",
+                    login_url=self.login_url,
+                    path=quote(path),
+                ),
+                markup=False,
+            )
+        self.out.print(message("The server runs until Ctrl-C; its data is then removed."))
         try:
             while True:
                 self.events.get()

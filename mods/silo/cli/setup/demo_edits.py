@@ -12,6 +12,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from silo.bom.errors import DocumentError
+from silo.bom.message import message
 from silo.platform.whole_files import replace_patiently
 
 DOCUMENT_XML = "Document.xml"
@@ -56,12 +57,12 @@ def _object_with_label(path: Path, document: ElementTree.Element, label: str) ->
         text = obj.find("Properties/Property[@name='Label']/String")
         if text is not None and text.get("value") == label:
             return obj.get("name", "")
-    raise DocumentError(str(path), f"it holds no object labelled {label!r}")
+    raise DocumentError(str(path), message("it holds no object labelled {label}", label=repr(label)))
 
 
 def _only(path: Path, element: ElementTree.Element | None, what: str) -> ElementTree.Element:
     if element is None:
-        raise DocumentError(str(path), f"it holds no {what}")
+        raise DocumentError(str(path), message("it holds no {what}", what=what))
     return element
 
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from silo import spoken
 from silo.bom.errors import ConfigError, Exit, ForbiddenError, NotFoundError, SiloError, counted, exit_of
+from silo.bom.message import message
 from silo.cli.connection import client_of
 from silo.cli.json_output import print_json
 from silo.cli.options import add_options
@@ -34,7 +35,9 @@ T = TypeVar("T")
 
 
 def add_doctor(parser: argparse.ArgumentParser) -> None:
-    text = "delete what is remembered of files and servers (the cache); commits and the configuration stay"
+    text = message(
+        "delete what is remembered of files and servers (the cache); commits and the configuration stay"
+    )
     add_options(parser, {"--clean": text})
 
 
@@ -54,7 +57,12 @@ def _clean() -> str:
     size = sum(file.stat().st_size for file in files)
     for path in found:
         shutil.rmtree(path) if path.is_dir() else remove_patiently(path)
-    return f"{folder}: {counted(len(files), 'file')} deleted, {size / 1e6:.1f} MB"
+    return message(
+        "{folder}: {files} deleted, {size} MB",
+        folder=folder,
+        files=counted(len(files), "file"),
+        size=f"{size / 1000000.0:.1f}",
+    )
 
 
 def run_doctor(args: argparse.Namespace) -> int:
@@ -102,10 +110,17 @@ def _program() -> str:
     names = {name.replace("_", "-") for name in importlib.metadata.packages_distributions().get("silo", ())}
     if others := sorted(names - {"silo-mod"}):
         raise ConfigError(
-            f"{', '.join(others)} also has a package named silo, in the same place. Uninstall it, and "
-            "install silo-mod again"
+            message(
+                "{others} also has a package named silo, in the same place. Uninstall it, and "
+                "install silo-mod again",
+                others=", ".join(others),
+            )
         )
-    return f"{importlib.metadata.version('silo-mod')}, Python {sys.version.split()[0]}"
+    return message(
+        "{version}, Python {version1}",
+        version=importlib.metadata.version("silo-mod"),
+        version1=sys.version.split()[0],
+    )
 
 
 def _configuration() -> str:
@@ -113,7 +128,7 @@ def _configuration() -> str:
 
     path = config_path()
     checked_config(path)
-    return str(path) if path.exists() else f"{path} (none yet; everything has a default)"
+    return str(path) if path.exists() else message("{path} (none yet; everything has a default)", path=path)
 
 
 def _folder(path: os.PathLike[str]) -> str | SiloError:
@@ -122,14 +137,22 @@ def _folder(path: os.PathLike[str]) -> str | SiloError:
     while not os.path.lexists(there) and os.path.dirname(there) != there:
         there = os.path.dirname(there)
     if not (os.path.isdir(there) and os.access(there, os.W_OK)):
-        return ConfigError(f"{path}: {there} is no folder that you can write to; SILO_HOME names another one")
+        return ConfigError(
+            message(
+                "{path}: {there} is no folder that you can write to; SILO_HOME names another one",
+                path=path,
+                there=there,
+            )
+        )
     return str(path)
 
 
 def _extra(name: str, package: str, used_by: str) -> str:
     if importlib.util.find_spec(package) is not None:
-        return f"the extra is installed ({used_by})"
-    return f"not installed ({used_by} need it): pip install 'silo-mod[{name}]'"
+        return message("the extra is installed ({used_by})", used_by=used_by)
+    return message(
+        "not installed ({used_by} need it): pip install 'silo-mod[{name}]'", used_by=used_by, name=name
+    )
 
 
 def _freecad() -> str | tuple[str, Installation]:
@@ -138,26 +161,35 @@ def _freecad() -> str | tuple[str, Installation]:
     from silo.freecads.run import find_freecadcmd
 
     if not os.environ.get("SILO_FREECADCMD") and next(commands(), None) is None:
-        return "none found (files are read without it; only the add-on and bom --verify need one)"
+        return message("none found (files are read without it; only the add-on and bom --verify need one)")
     command = find_freecadcmd()
     place = ask_freecad(command)
     others = [path for path in commands() if path != command]
     versions = "{}.{}, Python {}.{}".format(*place.freecad, *place.python)
-    return f"{command}: {versions}" + (f"; also {_listed(others)}" if others else ""), place
+    return message("{command}: {versions}", command=command, versions=versions) + (
+        message("; also {others}", others=_listed(others)) if others else ""
+    ), place
 
 
 def _addon(place: Installation) -> str:
     if not place.mod.exists():
-        return f"not in {place.mod}: `silo-mod install-addon` puts it there"
+        return message("not in {mod}: `silo-mod install-addon` puts it there", mod=place.mod)
     if place.missing:
-        lacks = ", ".join(f"{name} ({reason})" for name, reason in place.missing.items())
+        lacks = ", ".join(
+            message("{name} ({reason})", name=name, reason=reason) for name, reason in place.missing.items()
+        )
         them = "it" if len(place.missing) == 1 else "them"
-        return f"{place.mod}, without {lacks}: `silo-mod install-addon` installs {them}"
+        return message(
+            "{mod}, without {lacks}: `silo-mod install-addon` installs {them}",
+            mod=place.mod,
+            lacks=lacks,
+            them=them,
+        )
     return str(place.mod)
 
 
 def _listed(texts: Iterable[str]) -> str:
-    return ", ".join(texts) or "none found"
+    return ", ".join(texts) or message("none found")
 
 
 def _server(args: argparse.Namespace) -> Rows:
@@ -169,8 +201,10 @@ def _server(args: argparse.Namespace) -> Rows:
         with client_of(args) as client:
             client.abilities = Abilities()  # looked at again, and kept for the other commands
             return {
-                "address": f"{client.base_url} (from {where.url_from})",
-                "token": f"from {where.token_from}" if where.token else "none",
+                "address": message(
+                    "{base_url} (from {url_from})", base_url=client.base_url, url_from=where.url_from
+                ),
+                "token": message("from {token_from}", token_from=where.token_from) if where.token else "none",
                 **look(client, args.schema),
             }
     except ConfigError as error:
@@ -182,7 +216,7 @@ def look(client: SiloClient, schema: str) -> dict[str, Any]:
     return {
         "mode": _tried(lambda: _mode(client)),
         "who": _tried(lambda: _who(client)),
-        "items": _tried(lambda: (client.search_items(limit=1), "can be read")[1]),
+        "items": _tried(lambda: (client.search_items(limit=1), message("can be read"))[1]),
         "identities": _tried(lambda: _identities(client)),
         "schema": _tried(lambda: client.find_schema(schema)),
         "modules": _tried(lambda: _modules(client)),
@@ -199,28 +233,32 @@ def _tried(ask: Callable[[], T]) -> T | SiloError:
 
 def _mode(client: SiloClient) -> str:
     state = client.ready()
-    return f"{state.mode}, version {state.version}" if state.version else state.mode
+    return (
+        message("{mode}, version {version}", mode=state.mode, version=state.version)
+        if state.version
+        else state.mode
+    )
 
 
 def _who(client: SiloClient) -> str:
     try:
         user = client.whoami()
     except NotFoundError:
-        return "the server does not say"
-    writes = " (reads only: register, sync and push need an editor)" if user.role == "viewer" else ""
+        return message("the server does not say")
+    writes = message(" (reads only: register, sync and push need an editor)") if user.role == "viewer" else ""
     return f"{user.username}, {user.role}{writes}" if user.role else user.username
 
 
 def _identities(client: SiloClient) -> str:
     client.get_items_by_uuid([NOBODY])
-    return "many in one question" if client.abilities.batch else "one by one"
+    return message("many in one question") if client.abilities.batch else message("one by one")
 
 
 def _modules(client: SiloClient) -> str:
     try:
-        return ", ".join(client.modules()) or "none are named"
+        return ", ".join(client.modules()) or message("none are named")
     except (NotFoundError, ForbiddenError):
-        return "the server does not say"
+        return message("the server does not say")
 
 
 def _events(client: SiloClient) -> str:

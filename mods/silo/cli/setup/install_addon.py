@@ -8,6 +8,7 @@ from pathlib import Path
 
 from silo import spoken
 from silo.bom.errors import Exit
+from silo.bom.message import message
 from silo.cli.json_output import print_json
 from silo.cli.options import add_options
 
@@ -16,9 +17,9 @@ def add_install_addon(parser: argparse.ArgumentParser) -> None:
     add_options(
         parser,
         {
-            "--freecadcmd PATH": "freecadcmd (default: found on the PATH)",
-            "--freecad-data DIR": "its data folder (default: FreeCAD is asked)",
-            "--copy": "copy the add-on, do not link to this checkout",
+            "--freecadcmd PATH": message("freecadcmd (default: found on the PATH)"),
+            "--freecad-data DIR": message("its data folder (default: FreeCAD is asked)"),
+            "--copy": message("copy the add-on, do not link to this checkout"),
         },
     )
 
@@ -36,6 +37,11 @@ def run_install_addon(args: argparse.Namespace) -> int:
     if args.json:
         print_json(report)
     else:
-        text = f"{report['freecad']}\nAdd-on:   {report['addon']}\nPackages: {report['packages']}"
-        print(spoken(f"{text}\nStart FreeCAD again, and choose the workbench Silo."))
+        text = message(
+            "{report}\nAdd-on:   {report1}\nPackages: {report2}",
+            report=report["freecad"],
+            report1=report["addon"],
+            report2=report["packages"],
+        )
+        print(spoken(message("{text}\nStart FreeCAD again, and choose the workbench Silo.", text=text)))
     return Exit.DONE

@@ -12,8 +12,9 @@ import webbrowser
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from silo import spoken
+from silo import caption, spoken
 from silo.bom.errors import AuthError, Exit, InputError
+from silo.bom.message import message
 from silo.cli.connection import account_of, client_of
 from silo.cli.json_output import print_json
 from silo.cli.options import add_options
@@ -35,7 +36,12 @@ def run_whoami(args: argparse.Namespace) -> int:
         print_json(account)
     else:
         who = ", ".join(filter(None, (name, role)))
-        text = f"{account['url']} (from {account['from']}): {who or 'this server does not say who you are'}"
+        text = message(
+            "{account} (from {account1}): {who}",
+            account=account["url"],
+            account1=account["from"],
+            who=who or message("this server does not say who you are"),
+        )
         print(plain(spoken(text)))
     return Exit.DONE
 
@@ -53,9 +59,15 @@ def run_logout(args: argparse.Namespace) -> int:
     if args.json:
         print_json({"configuration": str(path), "removed": there})
     else:
-        print(spoken(f"{path} is removed." if there else f"There was no {path}; nothing is remembered."))
+        print(
+            spoken(
+                message("{path} is removed.", path=path)
+                if there
+                else message("There was no {path}; nothing is remembered.", path=path)
+            )
+        )
         if os.environ.get("SILO_API_TOKEN"):
-            print(spoken("SILO_API_TOKEN still has a token."))
+            print(caption("SILO_API_TOKEN still has a token."))
     return Exit.DONE
 
 
@@ -68,8 +80,8 @@ def add_login(parser: argparse.ArgumentParser) -> None:
     add_options(
         parser,
         {
-            "--paste": "type the token at the terminal, without a browser",
-            "--ca FILE": "certificate authorities to trust",
+            "--paste": message("type the token at the terminal, without a browser"),
+            "--ca FILE": message("certificate authorities to trust"),
         },
     )
     parser.set_defaults(waits=True)
@@ -93,8 +105,17 @@ def run_login(args: argparse.Namespace) -> int:
         data = {"url": client.base_url, "username": name, "role": role, "configuration": str(path)}
         print_json(data)
     else:
-        who = ", ".join(filter(None, (name, role))) or "this server does not say who you are"
-        print(spoken(f"{client.base_url}: {who}. Kept in {path}, which only you can read."))
+        who = ", ".join(filter(None, (name, role))) or message("this server does not say who you are")
+        print(
+            spoken(
+                message(
+                    "{base_url}: {who}. Kept in {path}, which only you can read.",
+                    base_url=client.base_url,
+                    who=who,
+                    path=path,
+                )
+            )
+        )
     return Exit.DONE
 
 
@@ -113,7 +134,12 @@ def _token_by_browser(args: argparse.Namespace) -> str:
     if login is None:
         return ""
     print(
-        f"Open this page and let silo-mod in; it shows the code {login.code}:\n{login.page}", file=sys.stderr
+        message(
+            "Open this page and let silo-mod in; it shows the code {code}:\n{page}",
+            code=login.code,
+            page=login.page,
+        ),
+        file=sys.stderr,
     )
     webbrowser.open(login.page)
     with SiloClient(where.url, login.token, verify=where.verify) as client:
@@ -122,14 +148,21 @@ def _token_by_browser(args: argparse.Namespace) -> str:
                 client.whoami()
                 return login.token
             time.sleep(1)
-    raise AuthError(f"nobody let silo-mod in within {LOGIN_SECONDS // 60} minutes; begin again")
+    raise AuthError(
+        message(
+            "nobody let silo-mod in within {login_seconds} minutes; begin again",
+            login_seconds=LOGIN_SECONDS // 60,
+        )
+    )
 
 
 def _token(url: str) -> str:
     if sys.stdin.isatty():
-        token = getpass.getpass(spoken(f"API token of {url} (its page “API tokens” makes one): "))
+        token = getpass.getpass(
+            spoken(message("API token of {url} (its page “API tokens” makes one): ", url=url))
+        )
     else:
         token = sys.stdin.readline()
     if not token.strip():
-        raise InputError("no token was given; nothing was changed")
+        raise InputError(message("no token was given; nothing was changed"))
     return token.strip()

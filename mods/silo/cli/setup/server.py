@@ -13,6 +13,7 @@ from dataclasses import asdict
 
 from silo import spoken
 from silo.bom.errors import ConfigError, Exit
+from silo.bom.message import message
 from silo.cli.options import a_path, add_old_name, add_options, not_with
 
 
@@ -21,9 +22,13 @@ def add_serve(parser: argparse.ArgumentParser) -> None:
         "--host", default="127.0.0.1", help="address to listen on (default: this machine only)"
     )
     parser.add_argument("--port", type=int, default=8080, help="port; 0 takes a free one (default: 8080)")
-    add_options(parser, {"--database URL": "sqlite:///FILE or postgresql://…; default: your data folder"})
+    add_options(
+        parser, {"--database URL": message("sqlite:///FILE or postgresql://…; default: your data folder")}
+    )
     parser.add_argument("--workers", type=int, default=1, metavar="N", help="server processes (PostgreSQL)")
-    add_options(parser, {"--reset-admin NAME": "make this user an active admin, and print a login link"})
+    add_options(
+        parser, {"--reset-admin NAME": message("make this user an active admin, and print a login link")}
+    )
     parser.set_defaults(waits=True)
 
 
@@ -34,7 +39,10 @@ def need_server_extra() -> None:
     ]
     if missing:
         raise ConfigError(
-            f"the embedded server needs {', '.join(missing)}; install it with: pip install 'silo-mod[server]'"
+            message(
+                "the embedded server needs {missing}; install it with: pip install 'silo-mod[server]'",
+                missing=", ".join(missing),
+            )
         )
 
 
@@ -65,8 +73,8 @@ def add_restore(parser: argparse.ArgumentParser) -> None:
     add_options(
         parser,
         {
-            "--replace-database": "replace a database that has items; they are lost",
-            "--dry-run": "only check that the backup is whole; change nothing",
+            "--replace-database": message("replace a database that has items; they are lost"),
+            "--dry-run": message("only check that the backup is whole; change nothing"),
         },
     )
     _add_place(parser)
@@ -89,19 +97,27 @@ def run_summaries(args: argparse.Namespace) -> int:
 
     settings = settings_from_environment(database_url=args.database, files_dir=args.files)
     if settings.sqlite_path is not None and not settings.sqlite_path.is_file():
-        raise ConfigError(f"summaries: there is no database {settings.sqlite_path}")
+        raise ConfigError(
+            message("summaries: there is no database {sqlite_path}", sqlite_path=settings.sqlite_path)
+        )
     db = Database(settings)
     try:
         upgrade(db)
         count = keep_all(db, _report)
     finally:
         db.close()
-    print(json.dumps({"assemblies": count}) if args.json else spoken(f"{count} assemblies summed up."))
+    print(
+        json.dumps({"assemblies": count})
+        if args.json
+        else spoken(message("{count} assemblies summed up.", count=count))
+    )
     return Exit.DONE
 
 
 def _add_place(parser: argparse.ArgumentParser) -> None:
-    add_options(parser, {"--database URL": "sqlite:///FILE or postgresql://… (else SILO_DATABASE_URL)"})
+    add_options(
+        parser, {"--database URL": message("sqlite:///FILE or postgresql://… (else SILO_DATABASE_URL)")}
+    )
     parser.add_argument(
         "--files",
         metavar="FOLDER",
@@ -119,8 +135,18 @@ def run_backup(args: argparse.Namespace) -> int:
     settings = settings_from_environment(database_url=args.database, files_dir=args.files)
     made = back_up(settings, args.target, _report)
     for checksum in made.missing_files:
-        print(f"missing: the file {checksum} is lost or damaged in the server's store", file=sys.stderr)
-    text = f"Backup {args.target}: {sum(made.rows.values())} rows, {made.files} files."
+        print(
+            message(
+                "missing: the file {checksum} is lost or damaged in the server's store", checksum=checksum
+            ),
+            file=sys.stderr,
+        )
+    text = message(
+        "Backup {target}: {rows} rows, {files} files.",
+        target=args.target,
+        rows=sum(made.rows.values()),
+        files=made.files,
+    )
     print(json.dumps(asdict(made)) if args.json else spoken(text))
     return Exit.UNDONE if made.missing_files else Exit.DONE
 
@@ -133,11 +159,21 @@ def run_restore(args: argparse.Namespace) -> int:
 
     if args.dry_run:
         made = verify(args.source)
-        text = f"The backup of {made.made_at} is whole: {sum(made.rows.values())} rows, {made.files} files."
+        text = message(
+            "The backup of {made_at} is whole: {rows} rows, {files} files.",
+            made_at=made.made_at,
+            rows=sum(made.rows.values()),
+            files=made.files,
+        )
     else:
         settings = settings_from_environment(database_url=args.database, files_dir=args.files)
         made = restore(settings, args.source, replace=args.replace_database, report=_report)
-        text = f"Restored the backup of {made.made_at}: {sum(made.rows.values())} rows, {made.files} files."
+        text = message(
+            "Restored the backup of {made_at}: {rows} rows, {files} files.",
+            made_at=made.made_at,
+            rows=sum(made.rows.values()),
+            files=made.files,
+        )
     print(json.dumps(asdict(made)) if args.json else spoken(text))
     return Exit.DONE
 

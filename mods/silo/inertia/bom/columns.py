@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from silo.bom.headers import Heading, alias, normal
+from silo.bom.message import message
 from silo.inertia.bom.mass_header import MassHeader, read_mass_header
 from silo.tables.columns import Columns
 from silo.tables.kind import TableKind
@@ -84,7 +85,7 @@ def continues(header: SheetRow, columns: Columns, below: SheetRow) -> bool:
         return False
     places = [columns.at[role] for role in MASS_COLUMNS if role in columns.at]
     read = [
-        read_mass_header(f"mass ({cell.strip('[](){} ')})")
+        read_mass_header(message("mass ({cell})", cell=cell.strip("[](){} ")))
         for place in places
         for cell in below.cells[place : place + 1]
         if any(map(str.isalpha, cell))

@@ -12,6 +12,7 @@ import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+from silo.bom.message import message
 from silo.bom.numbers import Mark, common_mark, parse_number, plain_text
 
 HEAVIEST = 1e12
@@ -117,7 +118,7 @@ def parse_mass(text: str, *, mark: Mark | None = None, unit: str | None = None) 
         return MassCell()
     cell = plain_text(text)
     if _ERROR.match(cell):
-        return MassCell(problem="is an error of the spreadsheet")
+        return MassCell(problem=message("is an error of the spreadsheet"))
     if (split := _TOLERANCE.fullmatch(cell)) is not None:
         own = split["mass"] + (f" {split['unit']}" if split["mass"][-1].isdecimal() else "")
         whole, by = (
@@ -127,30 +128,34 @@ def parse_mass(text: str, *, mark: Mark | None = None, unit: str | None = None) 
     if (both := _TWO_UNITS.fullmatch(cell)) is not None and (one_large := unit_factor(both[2])):
         large, small = (parse_mass(both[i], mark=mark, unit=both[i + 1]) for i in (1, 3))
         if large.kg is None or small.kg is None or small.kg >= one_large:
-            return MassCell(problem="is no mass")
+            return MassCell(problem=message("is no mass"))
         return replace(small, kg=large.kg + small.kg, ambiguous=large.ambiguous or small.ambiguous)
     if (split := _UNIT_FIRST.fullmatch(cell)) is not None and unit_factor(split["unit"]) is not None:
         cell = f"{split['number']} {split['unit']}"
     doubt = ""
     if cell[:1] in ("~", "≈"):
-        cell, doubt = cell.lstrip("~≈ "), "is marked as approximate"
+        cell, doubt = cell.lstrip("~≈ "), message("is marked as approximate")
     if cell.startswith("(") and cell.endswith(")"):
-        cell, doubt = cell[1:-1].strip(), "is in brackets: a reference, or a negative number"
+        cell, doubt = cell[1:-1].strip(), message("is in brackets: a reference, or a negative number")
     split = _CELL.fullmatch(_PER_PIECE.sub("", cell))
     if split is None:
-        return MassCell(problem="is no mass")
+        return MassCell(problem=message("is no mass"))
     number = parse_number(re.sub(r"^([+\-−])\s+", r"\1", split["number"]), mark)
     if number is None:
-        return MassCell(problem="has no number that can be read")
+        return MassCell(problem=message("has no number that can be read"))
     written = split["unit"].strip().rstrip(".")
     factor = unit_factor(written or unit or "kg")
     if factor is None:
-        return MassCell(problem=f"has the unknown unit “{written or unit}”")
+        return MassCell(problem=message("has the unknown unit “{unit}”", unit=written or unit))
     value = number.value * factor
     if not math.isfinite(value) or value >= HEAVIEST:
-        return MassCell(problem=f"is above {HEAVIEST:g} kg" if math.isfinite(value) else "is not finite")
+        return MassCell(
+            problem=message("is above {heaviest} kg", heaviest=f"{HEAVIEST:g}")
+            if math.isfinite(value)
+            else message("is not finite")
+        )
     if value < 0:
-        return MassCell(problem="is negative")
+        return MassCell(problem=message("is negative"))
     return MassCell(
         kg=value,
         quantum_kg=number.step * factor / 2,

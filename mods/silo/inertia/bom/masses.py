@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from silo.bom.headers import Heading
+from silo.bom.message import message
 from silo.bom.numbers import Mark
 from silo.inertia.bom.columns import MASS_COLUMNS, mass_columns
 from silo.inertia.bom.mass_cell import FORCE_UNITS, MassCell, column_mark, parse_mass, unit_factor
@@ -62,11 +63,13 @@ class MassReader:
         if not masses:
             return Heading.MASS_UNIT
         title = sheet.header[at[Heading.UNIT]].strip()
-        words = f"the column “{title}” was read as the unit of the masses"
+        words = message("the column “{title}” was read as the unit of the masses", title=title)
         if masses != units:
-            words = (
-                f"the column “{title}” has units of mass ({', '.join(sorted(masses))}) beside others; "
-                "it was read as the unit of the quantities, and not of the masses"
+            words = message(
+                "the column “{title}” has units of mass ({masses}) beside others; it was read as "
+                "the unit of the quantities, and not of the masses",
+                title=title,
+                masses=", ".join(sorted(masses)),
             )
         self._report(BomCode.FILE, words, sheet.header_line, "")
         return Heading.UNIT if masses == units else Heading.MASS_UNIT
@@ -84,7 +87,7 @@ class MassReader:
             return cell
         if quantity:
             return replace(total, kg=total.kg / quantity, quantum_kg=total.quantum_kg / quantity)
-        words = "there is a total mass only, and no quantity to divide it by; it is not used"
+        words = message("there is a total mass only, and no quantity to divide it by; it is not used")
         self._report(BomCode.UNREADABLE_MASS, words, row.line, name)
         return MassCell()
 
@@ -122,18 +125,35 @@ class MassReader:
         if cell.ambiguous:
             cell = self._decide(text, unit, row, name)
         if cell.doubt:
-            self._report(BomCode.AMBIGUOUS_MASS, f"the mass “{text}” {cell.doubt}", row.line, name)
+            self._report(
+                BomCode.AMBIGUOUS_MASS,
+                message("the mass “{text}” {doubt}", text=text, doubt=cell.doubt),
+                row.line,
+                name,
+            )
         if cell.problem is not None:
-            words = f"the mass “{text}” {cell.problem}; it is not used"
+            words = message("the mass “{text}” {problem}; it is not used", text=text, problem=cell.problem)
             self._report(BomCode.UNREADABLE_MASS, words, row.line, name)
         if cell.kg is None:
             return cell
         if not cell.unit:
-            sentence = f"and “{header.strange}” in its header is no known unit"
-            words = f"the mass “{text}” has no unit, {sentence if header.strange else 'nor has its header'}"
-            self._report(BomCode.MASS_WITHOUT_UNIT, f"{words}; read as kg", row.line, name, once=True)
+            sentence = message("and “{strange}” in its header is no known unit", strange=header.strange)
+            words = message(
+                "the mass “{text}” has no unit, {sentence}",
+                text=text,
+                sentence=sentence if header.strange else message("nor has its header"),
+            )
+            self._report(
+                BomCode.MASS_WITHOUT_UNIT,
+                message("{words}; read as kg", words=words),
+                row.line,
+                name,
+                once=True,
+            )
         if cell.unit in FORCE_UNITS:
-            words = f"“{cell.unit}” is a unit of force; masses are what weighs as much at 9.80665 m/s²"
+            words = message(
+                "“{unit}” is a unit of force; masses are what weighs as much at 9.80665 m/s²", unit=cell.unit
+            )
             self._report(BomCode.FILE, words, row.line, name, once=True)
         return cell
 
@@ -145,8 +165,13 @@ class MassReader:
             return likely
         self._report(
             BomCode.AMBIGUOUS_MASS,
-            f"the mass “{text}” was read as {likely.kg:.9g} kg but could be {unlikely.kg:.9g} kg, "
-            "and no other mass shows which mark is the decimal one; say so with --decimal",
+            message(
+                "the mass “{text}” was read as {kg} kg but could be {kg2} kg, and no other mass "
+                "shows which mark is the decimal one; say so with --decimal",
+                text=text,
+                kg=f"{likely.kg:.9g}",
+                kg2=f"{unlikely.kg:.9g}",
+            ),
             row.line,
             name,
         )
@@ -164,18 +189,24 @@ class MassReader:
         if not self._is_own(row):
             if all(parent.quantity == 1 for parent in above):
                 return row
-            words = (
-                f"the total mass was divided by the {row.quantity:g} pieces in one “{above[0].name}”; "
-                "if it is the total of the whole product, one piece weighs less"
+            words = message(
+                "the total mass was divided by the {quantity} pieces in one “{name}”; if it is "
+                "the total of the whole product, one piece weighs less",
+                quantity=f"{row.quantity:g}",
+                name=above[0].name,
             )
             self._report(BomCode.AMBIGUOUS_MASS, words, row.line, row.name)
             return replace(row, unsure=True)
         # Of the row, or of the whole product (as in Silo's own export): the one that fits counts.
         counts = {row.quantity, table.total_quantity(row) or row.quantity}
         if not any(_agree(row, count, total) for count in counts):
-            words = (
-                f"the total mass says {total.kg:.6g} kg, but {row.quantity:g} times {row.mass_kg:.6g} kg is "
-                f"{row.mass_kg * row.quantity:.6g} kg; the mass of one piece was used"
+            words = message(
+                "the total mass says {kg} kg, but {quantity} times {mass_kg} kg is {quantity3} "
+                "kg; the mass of one piece was used",
+                kg=f"{total.kg:.6g}",
+                quantity=f"{row.quantity:g}",
+                mass_kg=f"{row.mass_kg:.6g}",
+                quantity3=f"{row.mass_kg * row.quantity:.6g}",
             )
             self._report(BomCode.TOTAL_DIFFERS, words, row.line, row.name)
         return row

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from silo.bom.errors import InputError, counted
 from silo.bom.headers import Heading
+from silo.bom.message import message
 from silo.bom.numbers import Mark, read_count
 from silo.bom.quantities import LARGEST_QUANTITY
 from silo.inertia.bom.columns import MASSES, NAMING, MassColumns, continues, mass_columns
@@ -56,9 +57,13 @@ class BOMParser:
         mass_unit: str | None = None,
     ) -> None:
         if decimal not in (None, ".", ","):
-            raise InputError(f"the decimal mark is “.” or “,”, got “{decimal}”")
+            raise InputError(message("the decimal mark is “.” or “,”, got “{decimal}”", decimal=decimal))
         if mass_unit is not None and unit_factor(mass_unit) is None:
-            raise InputError(f"“{mass_unit}” is not a unit of mass; known are kg, g, mg, t, lb, oz")
+            raise InputError(
+                message(
+                    "“{mass_unit}” is not a unit of mass; known are kg, g, mg, t, lb, oz", mass_unit=mass_unit
+                )
+            )
         self._columns = columns
         self._encoding = encoding
         self._delimiter = delimiter
@@ -72,7 +77,9 @@ class BOMParser:
         try:
             data = Path(path).read_bytes()
         except OSError as error:
-            raise InputError(f"{path}: the BOM cannot be read ({error.strerror or error})") from error
+            raise InputError(
+                message("{path}: the BOM cannot be read ({error})", path=path, error=error.strerror or error)
+            ) from error
         return self.parse_bytes(data, str(path))
 
     def parse_bytes(self, data: bytes, source: str = "BOM") -> BomTable:
@@ -106,7 +113,9 @@ def _is_counted(sheet: Sheet, row: SheetRow, warnings: list[BomWarning]) -> bool
     names = [cell(row.cells, role) for role in NAMING]
     name = next(filter(None, names), "")
     if is_total(names, row.cells):
-        warnings.append(BomWarning(BomCode.LEFT_OUT, "is a sum and no part; it was left out", row.line, name))
+        warnings.append(
+            BomWarning(BomCode.LEFT_OUT, message("is a sum and no part; it was left out"), row.line, name)
+        )
         return False
     for role in (Heading.NOT_FITTED, Heading.FITTED):
         text = cell(row.cells, role)
@@ -115,17 +124,23 @@ def _is_counted(sheet: Sheet, row: SheetRow, warnings: list[BomWarning]) -> bool
         title = sheet.header[sheet.columns.at[role]].strip()
         fitted = is_fitted(text, by_absence=role is Heading.NOT_FITTED)
         if fitted is None:
-            words = f"“{text}” under “{title}” is neither yes nor no; the row was read as fitted"
+            words = message(
+                "“{text}” under “{title}” is neither yes nor no; the row was read as fitted",
+                text=text,
+                title=title,
+            )
             warnings.append(BomWarning(BomCode.FILE, words, row.line, name))
         elif not fitted:
-            words = f"is not fitted (“{title}” is “{text}”); it was left out"
+            words = message("is not fitted (“{title}” is “{text}”); it was left out", title=title, text=text)
             warnings.append(BomWarning(BomCode.LEFT_OUT, words, row.line, name))
             return False
     if Heading.FITTED in sheet.columns.at and not cell(row.cells, Heading.FITTED):
         texts = [cell(other.cells, Heading.FITTED) for other in sheet.rows]
         if not empty_means_fitted(texts):
             title = sheet.header[sheet.columns.at[Heading.FITTED]].strip()
-            words = f"“{title}” is empty here and not elsewhere; the row was read as fitted"
+            words = message(
+                "“{title}” is empty here and not elsewhere; the row was read as fitted", title=title
+            )
             warnings.append(BomWarning(BomCode.FILE, words, row.line, name))
     return True
 
@@ -137,7 +152,7 @@ def _entry(
     number, text = cell(row.cells, Heading.PART_NUMBER), cell(row.cells, Heading.DESCRIPTION)
     name = cell(row.cells, Heading.NAME) or ("" if Heading.NAME in sheet.columns.at else text) or number
     if not name:
-        words = "has no name and no part number; it was left out"
+        words = message("has no name and no part number; it was left out")
         warnings.append(BomWarning(BomCode.NO_NAME, words, row.line))
         return None
     _check_length(sheet, row, name, warnings)
@@ -170,16 +185,22 @@ def _quantity(text: str, line: int, name: str, warnings: list[BomWarning]) -> fl
     reading = read_count(text)
     if reading.value is not None and 0 <= reading.value <= LARGEST_QUANTITY:
         return float(reading.value)
-    problem = reading.problem or "wanted a number of pieces"
-    words = f"the quantity “{text}” cannot be read and is not used: {problem}"
+    problem = reading.problem or message("wanted a number of pieces")
+    words = message(
+        "the quantity “{text}” cannot be read and is not used: {problem}", text=text, problem=problem
+    )
     warnings.append(BomWarning(BomCode.UNREADABLE_QUANTITY, words, line, name))
     return None
 
 
 def _check_length(sheet: Sheet, row: SheetRow, name: str, warnings: list[BomWarning]) -> None:
     if sheet.delimiter and len(row.cells) <= max(sheet.columns.at.values()):
-        words = f"has {counted(len(row.cells), 'cell')}, and the header has {len(sheet.header)}; "
-        words += "the missing ones count as empty"
+        words = message(
+            "has {cells}, and the header has {count}; ",
+            cells=counted(len(row.cells), "cell"),
+            count=len(sheet.header),
+        )
+        words += message("the missing ones count as empty")
         warnings.append(BomWarning(BomCode.ROW_LENGTH, words, row.line, name))
 
 
@@ -187,7 +208,9 @@ def _doubtful_columns(sheet: Sheet, headers: MassColumns) -> Iterator[BomWarning
     at = sheet.columns.at
     for role, header in headers.masses.items():
         if header.rate:
-            words = f"“{sheet.header[at[role]].strip()}” is no mass by its header, and was used as one"
+            words = message(
+                "“{role}” is no mass by its header, and was used as one", role=sheet.header[at[role]].strip()
+            )
             yield BomWarning(BomCode.FILE, words, sheet.header_line)
     seen = ", ".join(cell.strip() for cell in sheet.header if cell.strip())
     unused = [
@@ -199,13 +222,18 @@ def _doubtful_columns(sheet: Sheet, headers: MassColumns) -> Iterator[BomWarning
     for what, is_role_known in (("mass", headers.masses), ("material", Heading.MATERIAL in at)):
         if not is_role_known:
             title = titles[0] if what == "mass" and titles else "…"
-            words = f"there is no {what} column (the columns are {seen}); "
-            words += f'if one of them is it, say --column "{what}={title}"'
+            words = message("there is no {what} column (the columns are {seen}); ", what=what, seen=seen)
+            words += message('if one of them is it, say --column "{what}={title}"', what=what, title=title)
             yield BomWarning(BomCode.MISSING_COLUMN, words, sheet.header_line)
     for title in titles if headers.masses else ():
-        words = f'the column “{title}” may hold masses, and was not used; --column "mass={title}" takes it'
+        words = message(
+            'the column “{title}” may hold masses, and was not used; --column "mass={title}" takes it',
+            title=title,
+        )
         if read_mass_header(title).rate:
-            words = f"the column “{title}” holds no masses of one piece, and was not used"
+            words = message(
+                "the column “{title}” holds no masses of one piece, and was not used", title=title
+            )
         yield BomWarning(BomCode.UNUSED_COLUMN, words, sheet.header_line)
 
 
@@ -215,9 +243,18 @@ def _second_columns(sheet: Sheet) -> Iterator[BomWarning]:
     for clash in find_clashes(sheet.header, cells, sheet.columns.at, sheet.columns.others, is_empty):
         yield BomWarning(
             BomCode.FILE,
-            f"the columns “{clash.ours}” and “{clash.other}” both mean the {clash.role.replace('_', ' ')}; "
-            f"“{clash.ours}” was used, though line {sheet.rows[clash.row].line} has “{clash.used}” there and "
-            f'“{clash.unused}” in the other. --column "{clash.role}={clash.other}" takes the other one',
+            message(
+                "the columns “{ours}” and “{other}” both mean the {role}; “{ours}” was used, "
+                "though line {line} has “{used}” there and “{unused}” in the other. --column "
+                '"{role6}={other}" takes the other one',
+                ours=clash.ours,
+                other=clash.other,
+                role=clash.role.replace("_", " "),
+                line=sheet.rows[clash.row].line,
+                used=clash.used,
+                unused=clash.unused,
+                role6=clash.role,
+            ),
             sheet.header_line,
         )
 
@@ -229,8 +266,13 @@ def _duplicates(rows: Sequence[BOMEntry]) -> list[BomWarning]:
     return [
         BomWarning(
             BomCode.DUPLICATE_NAME,
-            f"{len(same)} rows are named “{name}” (lines {', '.join(str(r.line) for r in same)}) "
-            "with different data; parts are matched by quantity and mass",
+            message(
+                "{count} rows are named “{name}” (lines {same}) with different data; parts are "
+                "matched by quantity and mass",
+                count=len(same),
+                name=name,
+                same=", ".join(str(r.line) for r in same),
+            ),
             same[1].line,
             name,
         )

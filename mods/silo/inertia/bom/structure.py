@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from silo.bom.headers import Heading
+from silo.bom.message import message
 from silo.inertia.bom.table import BomCode, BOMEntry, BomWarning
 from silo.tables import structure
 from silo.tables.sheet import Sheet
@@ -25,7 +26,7 @@ def with_levels_of_indents(rows: list[BOMEntry], sheet: Sheet, warnings: list[Bo
     levels = structure.indent_levels([cells.get(row.line, "") for row in rows])
     if levels is None:
         return rows
-    words = "the names are indented; a row belongs to the one above it that is indented less"
+    words = message("the names are indented; a row belongs to the one above it that is indented less")
     warnings.append(BomWarning(BomCode.FILE, words, sheet.header_line))
     return [replace(row, level=level + 1) for row, level in zip(rows, levels, strict=True)]
 
@@ -43,7 +44,7 @@ def level_of(text: str, item_role: Heading, line: int, name: str, warnings: list
     """Read a level: "2", "..2" and "+2" are one below "1". Item numbers (1.1) are no levels."""
     level = structure.level(text) if text and item_role is not Heading.LEVEL else None
     if level is None and text and item_role is not Heading.LEVEL:
-        words = f"the level “{text}” cannot be read; the row is taken to stand at the top"
+        words = message("the level “{text}” cannot be read; the row is taken to stand at the top", text=text)
         warnings.append(BomWarning(BomCode.FILE, words, line, name))
     return 1 if level is None else level
 
@@ -58,12 +59,21 @@ def doubtful_items(rows: Sequence[BOMEntry]) -> Iterator[BomWarning]:
     first: dict[str, int] = {}
     for row in rows:
         if first.setdefault(row.item, row.line) != row.line and "." in row.item:
-            words = (
-                f"the item number {row.item} stands in line {first[row.item]} as well (was it 1.10 for 1.1?)"
+            words = message(
+                "the item number {item} stands in line {item1} as well (was it 1.10 for 1.1?)",
+                item=row.item,
+                item1=first[row.item],
             )
-            yield BomWarning(BomCode.FILE, f"{words}; rows below may belong to either", row.line, row.name)
+            yield BomWarning(
+                BomCode.FILE,
+                message("{words}; rows below may belong to either", words=words),
+                row.line,
+                row.name,
+            )
         elif row.item and not structure.position(row.item):
-            words = f"the item number “{row.item}” cannot be read; the row is taken to stand at the top"
+            words = message(
+                "the item number “{item}” cannot be read; the row is taken to stand at the top", item=row.item
+            )
             yield BomWarning(BomCode.FILE, words, row.line, row.name)
 
 

@@ -7,6 +7,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
+from silo.bom.message import message
+
 
 class BomCode(StrEnum):
     """The machine names of what reading a BOM noticed."""
@@ -35,7 +37,11 @@ class BomWarning:
     name: str = ""
 
     def __str__(self) -> str:
-        return f"line {self.line}: {self.message}" if self.line else self.message
+        return (
+            message("line {line}: {message}", line=self.line, message=self.message)
+            if self.line
+            else self.message
+        )
 
 
 @dataclass(frozen=True)

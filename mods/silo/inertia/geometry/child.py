@@ -22,12 +22,18 @@ from pathlib import Path
 from typing import IO, Any
 
 from silo.bom.errors import CancelledError, ConfigError, DocumentError
+from silo.bom.message import message
 from silo.inertia.geometry.options import Progress, ReadOptions
 from silo.platform import processes
 
 POLL_SECONDS = 0.05
 
-_OUT_OF_MEMORY = ("MemoryError", "bad_alloc", "Cannot allocate memory", "failed to map segment")
+_OUT_OF_MEMORY = (
+    "MemoryError",
+    "bad_alloc",
+    message("Cannot allocate memory"),
+    message("failed to map segment"),
+)
 
 _WORKER = "from silo.inertia.geometry.worker import main; main()"
 
@@ -71,11 +77,14 @@ def _talk(process: subprocess.Popen[bytes], path: Path, options: ReadOptions) ->
     deadline = time.monotonic() + options.timeout_s if options.timeout_s else None
     while True:
         if options.cancelled is not None and options.cancelled():
-            raise CancelledError(f"{path}: reading was cancelled")
+            raise CancelledError(message("{path}: reading was cancelled", path=path))
         if deadline is not None and time.monotonic() > deadline:
             raise DocumentError(
                 str(path),
-                f"could not be read within {options.timeout_s:g} s; allow more time, or simplify it",
+                message(
+                    "could not be read within {timeout_s} s; allow more time, or simplify it",
+                    timeout_s=f"{options.timeout_s:g}",
+                ),
             )
         try:
             line = lines.get(timeout=POLL_SECONDS)
@@ -127,8 +136,11 @@ def python() -> str:
         if os.path.isfile(path):
             return path
     raise ConfigError(
-        f"no Python interpreter was found beside {sys.executable} to read geometry with; "
-        "read it with isolate=False"
+        message(
+            "no Python interpreter was found beside {executable} to read geometry with; read "
+            "it with isolate=False",
+            executable=sys.executable,
+        )
     )
 
 
@@ -145,11 +157,18 @@ def _death(code: int, errors: IO[bytes], options: ReadOptions) -> str:
     errors.seek(0)
     words = errors.read()[-4000:].decode("utf-8", errors="replace")
     if any(sign in words for sign in _OUT_OF_MEMORY):
-        return f"needs more than the {options.memory_mb} MB allowed to read it; allow more memory"
-    if code < 0:
-        return (
-            f"the geometry kernel {processes.how_it_ended(code)} on it; the file is damaged, or trips "
-            "a bug of the kernel. Export it again, or with another application protocol"
+        return message(
+            "needs more than the {memory_mb} MB allowed to read it; allow more memory",
+            memory_mb=options.memory_mb,
         )
-    last = next((line for line in reversed(words.splitlines()) if line.strip()), f"exit code {code}")
-    return f"the reader stopped with an error: {last.strip()}"
+    if code < 0:
+        return message(
+            "the geometry kernel {code} on it; the file is damaged, or trips a bug of the "
+            "kernel. Export it again, or with another application protocol",
+            code=processes.how_it_ended(code),
+        )
+    last = next(
+        (line for line in reversed(words.splitlines()) if line.strip()),
+        message("exit code {code}", code=code),
+    )
+    return message("the reader stopped with an error: {last}", last=last.strip())

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from silo.bom.errors import DocumentError
+from silo.bom.message import message
 from silo.bom.walk.document import LinkProblem
 from silo.budget import Budget
 from silo.fcstd import Library
@@ -145,7 +146,7 @@ def located(shape: Any, matrix: np.ndarray) -> Any:
     if np.array_equal(matrix, np.eye(4)):
         return bare
     if not is_rigid(matrix):
-        raise DocumentError("", "its placement scales it inside of its part, which is not supported")
+        raise DocumentError("", message("its placement scales it inside of its part, which is not supported"))
     step = gp_Trsf()
     step.SetValues(*(float(v) for v in matrix[:3].ravel()))
     return bare.Located(TopLoc_Location(step))
@@ -228,7 +229,8 @@ class StoredFacts:
                 rows = np.frombuffer(data, dtype=form, offset=4).reshape(-1, 7).astype(np.float64)
                 return [placed(row) for row in rows]
         raise DocumentError(
-            obj.Document.FileName, f"the placements of {obj.Name} are damaged (their length is wrong)"
+            obj.Document.FileName,
+            message("the placements of {name} are damaged (their length is wrong)", name=obj.Name),
         )
 
     def shape(self, obj: Any) -> StoredShape | None:
@@ -256,7 +258,7 @@ class Entries:
 
     def __init__(self, budget: Budget = MODEL) -> None:
         self._open: dict[str, zipfile.ZipFile] = {}
-        self._account = budget.account("the shapes")
+        self._account = budget.account(message("the shapes"))
 
     def _info(self, path: str, name: str) -> tuple[zipfile.ZipFile, zipfile.ZipInfo]:
         if path not in self._open:
@@ -268,13 +270,22 @@ class Entries:
         try:
             archive, info = self._info(path, name)
             if info.file_size > MAX_ENTRY_BYTES:
-                raise DocumentError(path, f"its {name} would unpack to {info.file_size / 1e9:.1f} GB")
+                raise DocumentError(
+                    path,
+                    message(
+                        "its {name} would unpack to {file_size} GB",
+                        name=name,
+                        file_size=f"{info.file_size / 1000000000.0:.1f}",
+                    ),
+                )
             self._account.take_bytes(info.file_size)  # zipfile unpacks no more than that
             return archive.read(info)
         except KeyError as error:
-            raise DocumentError(path, f"its {name} is missing") from error
+            raise DocumentError(path, message("its {name} is missing", name=name)) from error
         except (OSError, zipfile.BadZipFile, NotImplementedError, RuntimeError) as error:
-            raise DocumentError(path, f"its {name} cannot be unpacked: {error}") from error
+            raise DocumentError(
+                path, message("its {name} cannot be unpacked: {error}", name=name, error=error)
+            ) from error
 
     def size(self, path: str, name: str) -> int:
         """Return how many bytes :meth:`read` returns; 1 if it raises."""

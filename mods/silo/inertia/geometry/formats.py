@@ -9,6 +9,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from silo.bom.errors import DocumentError
+from silo.bom.message import message
 
 
 class Format(StrEnum):
@@ -44,9 +45,11 @@ _SUFFIXES = {f".{kind}": kind for kind in Format} | {
 
 
 _OTHERS = {
-    b"<?xml": "is XML. STEP AP242 XML (.stpx) holds no geometry; export the assembly as STEP text (.step)",
+    b"<?xml": message(
+        "is XML. STEP AP242 XML (.stpx) holds no geometry; export the assembly as STEP text (.step)"
+    ),
     b"\x1f\x8b": "is compressed (gzip); unpack it first",
-    b"PK": "is a zip archive, and no FreeCAD document or 3MF file; unpack it first",
+    b"PK": message("is a zip archive, and no FreeCAD document or 3MF file; unpack it first"),
 }
 """What is refused with a word of its own, by its first bytes."""
 
@@ -75,24 +78,33 @@ def detect(path: Path) -> Format:
             raise DocumentError(str(path), words)
     if by_suffix is not None:
         raise DocumentError(
-            str(path), f"is named like a {by_suffix.value} file, but its content is not; export it again"
+            str(path),
+            message(
+                "is named like a {value} file, but its content is not; export it again", value=by_suffix.value
+            ),
         )
     readable = ", ".join(f".{kind}" for kind in Format)
-    raise DocumentError(str(path), f"has no geometry format that is read here ({readable})")
+    raise DocumentError(
+        str(path), message("has no geometry format that is read here ({readable})", readable=readable)
+    )
 
 
 def _head(path: Path) -> bytes:
     if path.is_dir():
-        raise DocumentError(str(path), "is a folder; name one file")
+        raise DocumentError(str(path), message("is a folder; name one file"))
     try:
         with path.open("rb") as stream:
             head = stream.read(_HEAD_BYTES)
     except OSError as error:
-        raise DocumentError(str(path), f"cannot be opened: {error.strerror or error}") from error
+        raise DocumentError(
+            str(path), message("cannot be opened: {error}", error=error.strerror or error)
+        ) from error
     if not head.strip():
-        raise DocumentError(str(path), "is empty; export it again")
+        raise DocumentError(str(path), message("is empty; export it again"))
     if head.startswith(b"version https://git-lfs"):
-        raise DocumentError(str(path), "is a Git LFS pointer, not the file; run `git lfs pull` first")
+        raise DocumentError(
+            str(path), message("is a Git LFS pointer, not the file; run `git lfs pull` first")
+        )
     return head
 
 
@@ -128,7 +140,9 @@ def _zip_kind(path: Path) -> Format | None:
         with zipfile.ZipFile(path) as archive:
             names = archive.namelist()
     except (zipfile.BadZipFile, OSError) as error:
-        raise DocumentError(str(path), f"is a damaged zip file ({error}); save it again") from error
+        raise DocumentError(
+            str(path), message("is a damaged zip file ({error}); save it again", error=error)
+        ) from error
     if "Document.xml" in names:
         return Format.FREECAD
     if any(name.lower().endswith(".model") for name in names):

@@ -29,6 +29,7 @@ from silo.bom.errors import DocumentError, InputError, listed
 from silo.bom.findings import FindingCode
 from silo.bom.items.naming import display_name
 from silo.bom.key import Key
+from silo.bom.message import message
 from silo.bom.walk.arrays import draft_elements, elements, left_out_by
 from silo.bom.walk.contents import Contents, Contribution, Count, Lost
 from silo.bom.walk.document import LinkProblem, derived, first_of, label_of, object_name, own, relative
@@ -75,7 +76,9 @@ def told_material(name: str, density: float | None) -> StatedMaterial:
     """Make a material of a name and a density [kg/m^3], which must be plausible."""
     sane = _sane(density)
     if sane is None:
-        return StatedMaterial(name, problem=f"its material '{name}' has no density that can be used")
+        return StatedMaterial(
+            name, problem=message("its material '{name}' has no density that can be used", name=name)
+        )
     return StatedMaterial(name, sane)
 
 
@@ -87,7 +90,11 @@ def _from_map(materials: dict[str, str]) -> StatedMaterial:
     if not text:
         return StatedMaterial(name)
     density = _sane(parse_density(text))
-    problem = "" if density is not None else f"the density '{text}' of its material cannot be used"
+    problem = (
+        ""
+        if density is not None
+        else message("the density '{text}' of its material cannot be used", text=text)
+    )
     return StatedMaterial(name, density, problem)
 
 
@@ -98,12 +105,16 @@ def card_material(uuid: str) -> StatedMaterial:
     card = card_of(uuid)
     if card is None:
         return StatedMaterial(
-            problem=f"its material (id {uuid}) is in no material library found on this machine; install "
-            "FreeCAD, or name the folder of its cards in FREECAD_MATERIALS"
+            problem=message(
+                "its material (id {uuid}) is in no material library found on this machine; "
+                "install FreeCAD, or name the folder of its cards in FREECAD_MATERIALS",
+                uuid=uuid,
+            )
         )
     if card.density is None:
         return StatedMaterial(
-            card.name, problem=f"the card of its material '{card.name}' has no usable density"
+            card.name,
+            problem=message("the card of its material '{name}' has no usable density", name=card.name),
         )
     return StatedMaterial(card.name, card.density)
 
@@ -197,7 +208,7 @@ class Walk:
     absent: set[str] = field(default_factory=set)
     _noted: dict[str, list[str]] = field(default_factory=dict)
     _open: list[str] = field(default_factory=list)
-    account: Account = field(default_factory=lambda: MODEL.account("the model"))
+    account: Account = field(default_factory=lambda: MODEL.account(message("the model")))
 
     def __post_init__(self) -> None:
         self._reader = silent_reader(
@@ -238,7 +249,11 @@ class Walk:
                 and (self.hardware or kind_of(member) is not Kind.STANDARD)
             ]
             if names:
-                words = f"{listed(names, 4)}: beside “{label_of(top)}” in the document, and in no mass"
+                words = message(
+                    "{names}: beside “{top}” in the document, and in no mass",
+                    names=listed(names, 4),
+                    top=label_of(top),
+                )
                 self._note("not_counted", words)
         return self.product(top)
 
@@ -253,8 +268,11 @@ class Walk:
         if self._is_known(key):
             return key
         if key in self._open or len(self._open) > MAX_DEPTH:
-            self._note("cycle", f"“{label_of(obj)}” contains itself; it is left out where the ring closes")
-            return self._nothing(obj, "it contains itself")
+            self._note(
+                "cycle",
+                message("“{obj}” contains itself; it is left out where the ring closes", obj=label_of(obj)),
+            )
+            return self._nothing(obj, message("it contains itself"))
         self._open.append(key)
         is_root = bool(getattr(obj, "is_document_root", False))
         holds = is_root or (is_container(obj) and copies is not obj and not self._is_one_shape(obj))
@@ -269,7 +287,9 @@ class Walk:
     def _container(self, key: str, obj: Any, contents: Contents, moved: dict[str, Floats]) -> None:
         if contents.hidden:
             names = listed([f"“{label_of(member)}”" for member in contents.hidden], 4)
-            self._note("hidden", f"bodies hidden beside visible ones are not counted: {names}")
+            self._note(
+                "hidden", message("bodies hidden beside visible ones are not counted: {names}", names=names)
+            )
         shapes = [use for count in contents.own for use in self._uses(obj, count, contents, moved)]
         bodies = [(end, place) for end, _, place in shapes if not is_container(end)]
         materials = {self.facts.material(end) for end, _ in bodies}
@@ -291,7 +311,11 @@ class Walk:
             for end, copies, place in self._uses(obj, count, contents, moved):
                 if not isinstance(end, Lost) and derived(end, "Mesh::Feature"):
                     self._note(
-                        "not_counted", f"“{label_of(end)}” is a mesh and no solid; its mass is not counted"
+                        "not_counted",
+                        message(
+                            "“{label_of}” is a mesh and no solid; its mass is not counted",
+                            label_of=label_of(end),
+                        ),
                     )
                     continue
                 product = self._lost(end) if isinstance(end, Lost) else self.product(end, copies)
@@ -344,7 +368,7 @@ class Walk:
         self.leaves[key] = Leaf(tuple(refs), material, lost=tuple(lost if refs else ()))
 
     def _nothing(self, obj: Any, reason: str, name: str = "") -> str:
-        key = f"nothing: {name or self._key(obj)} {reason}"
+        key = message("nothing: {obj} {reason}", obj=name or self._key(obj), reason=reason)
         self.nodes[key] = Node(key, name or self._name(obj), has_geometry=True)
         self.leaves[key] = Leaf(broken=reason)
         return key
@@ -355,8 +379,10 @@ class Walk:
         stem = file.rpartition("/")[2].rpartition(".")[0]
         if file in self.documents:  # it is there, and a changed copy in it was deleted
             self.absent.discard(file)
-            return self._nothing(lost, "its changed copy was deleted", lost.label)
-        return self._nothing(lost, f"its file {relative(file, self.base)} cannot be read", stem)
+            return self._nothing(lost, message("its changed copy was deleted"), lost.label)
+        return self._nothing(
+            lost, message("its file {base} cannot be read", base=relative(file, self.base)), stem
+        )
 
     def _is_known(self, key: str) -> bool:
         return key in self.nodes
@@ -366,7 +392,9 @@ class Walk:
         key = product_key(file_of(obj), object_name(obj), "" if registered else designation, self.base)
         if copies is None or copies is obj:
             return key
-        return f"{key} as in {object_name(copies)} of {file_of(copies)}"
+        return message(
+            "{key} as in {copies} of {copies2}", key=key, copies=object_name(copies), copies2=file_of(copies)
+        )
 
     def _name(self, obj: Any) -> str:
         document = getattr(obj, "Document", None)
@@ -387,7 +415,9 @@ class Walk:
         """Yield every instance of a component, in the axes of the container."""
         shown = count.shown
         if count.quantity > MAX_ELEMENTS:
-            words = f"{label_of(shown.obj)} claims {count.quantity} elements"
+            words = message(
+                "{obj} claims {quantity} elements", obj=label_of(shown.obj), quantity=count.quantity
+            )
             raise DocumentError(file_of(container), words)
         if contents.tree is None:
             yield from self._placed(shown, count.key, False)
@@ -464,7 +494,9 @@ class Walk:
         for inner in below:
             seen = list(self._placed(inner, key, own(obj, "LinkTransform") is True))
             if not places:
-                words = f"the array “{label_of(obj)}” was saved without its placements; counted once"
+                words = message(
+                    "the array “{obj}” was saved without its placements; counted once", obj=label_of(obj)
+                )
                 self._note("not_counted", words)
             self.account.take_objects(len(seen) * max(len(places), 1))
             left_out = [bool(left_out_by(element)) for element in draft_elements(obj)]
@@ -533,7 +565,9 @@ class Walk:
         if not is_link(link) or not isinstance(count, int) or count <= 0:
             return [np.eye(4)]
         if count > MAX_ELEMENTS:
-            raise DocumentError(file_of(link), f"the link {link.Name} claims {count} elements")
+            raise DocumentError(
+                file_of(link), message("the link {name} claims {count} elements", name=link.Name, count=count)
+            )
         if index is None and count > self.account.budget.objects:  # before a list of them is made
             self.account.take_objects(count)
         if len(listed_ones := elements(link)) == count:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from silo.bom.errors import InputError
+from silo.bom.message import message
 from silo.inertia.assembly import Instance
 
 Floats = NDArray[np.float64]
@@ -110,10 +111,18 @@ def unfold(nodes: Mapping[str, Node], roots: Sequence[Child], max_instances: int
     for root in roots:
         order = bottom_up(nodes, root.product)
         if depth(nodes, order) > MAX_DEPTH:
-            raise InputError(f"it nests its assemblies more than {MAX_DEPTH} deep")
+            raise InputError(
+                message("it nests its assemblies more than {max_depth} deep", max_depth=MAX_DEPTH)
+            )
         count += count_instances(nodes, order)
     if count > max_instances:
-        raise InputError(f"it unfolds to {count} placed parts, more than the {max_instances} allowed")
+        raise InputError(
+            message(
+                "it unfolds to {count} placed parts, more than the {max_instances} allowed",
+                count=count,
+                max_instances=max_instances,
+            )
+        )
     unfolded = Unfolded(nodes)
     if len(roots) == 1 and nodes[roots[0].product].children:
         unfolded.fill(roots[0].product, (), (), roots[0].transform)
@@ -176,7 +185,7 @@ def bottom_up(nodes: Mapping[str, Node], root: str) -> list[str]:
         if state.get(key) == 2:
             continue
         if state.get(key) == 1:
-            raise InputError(f"the product '{nodes[key].name}' contains itself")
+            raise InputError(message("the product '{name}' contains itself", name=nodes[key].name))
         state[key] = 1
         stack.append((key, True))
         stack.extend((child.product, False) for child in nodes[key].children if state.get(child.product) != 2)

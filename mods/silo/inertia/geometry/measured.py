@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from silo.bom.errors import counted, listed
+from silo.bom.message import message
 from silo.inertia.assembly import Assembly, Instance, Prototype, SolidProps
 from silo.inertia.geometry.graph import Unfolded
 from silo.inertia.geometry.names import lost_characters
@@ -35,9 +36,11 @@ FAR_AWAY = 1e4
 
 NO_VOLUME = Note(
     GeometryCode.INVALID_SHAPE,
-    "the solid has no volume that can be computed; it is left out",
+    message("the solid has no volume that can be computed; it is left out"),
 )
-INVALID = Note(GeometryCode.INVALID_SHAPE, "the geometry kernel's own check finds this shape invalid")
+INVALID = Note(
+    GeometryCode.INVALID_SHAPE, message("the geometry kernel's own check finds this shape invalid")
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,25 +89,35 @@ def integration_notes(
     """
     notes: list[Note] = []
     if error > CONVERGED:
-        message = f"the volume integration stopped at a relative error of {error:.1g}, wanted {eps:.1g}"
-        notes.append(Note(GeometryCode.NOT_CONVERGENT, message))
-    if distance_m > FAR_AWAY * size_m > 0:
-        message = (
-            f"the geometry lies {distance_m:.3g} m from its own origin, {distance_m / size_m:.0f} times its "
-            "size; its coordinates have lost digits"
+        text = message(
+            "the volume integration stopped at a relative error of {error}, wanted {eps}",
+            error=f"{error:.1g}",
+            eps=f"{eps:.1g}",
         )
-        notes.append(Note(GeometryCode.BAKED, message))
+        notes.append(Note(GeometryCode.NOT_CONVERGENT, text))
+    if distance_m > FAR_AWAY * size_m > 0:
+        text = message(
+            "the geometry lies {distance_m} m from its own origin, {size_m} times its size; "
+            "its coordinates have lost digits",
+            distance_m=f"{distance_m:.3g}",
+            size_m=f"{distance_m / size_m:.0f}",
+        )
+        notes.append(Note(GeometryCode.BAKED, text))
     if volume_m3 < 0:
-        message = f"the solid is inside out (volume {volume_m3:.6g} m3); its sign was turned"
-        notes.append(Note(GeometryCode.NEGATIVE_VOLUME, message))
+        text = message(
+            "the solid is inside out (volume {volume_m3} m3); its sign was turned",
+            volume_m3=f"{volume_m3:.6g}",
+        )
+        notes.append(Note(GeometryCode.NEGATIVE_VOLUME, text))
     return notes
 
 
 def differing_note(difference: float) -> Note:
     """Note that two integrations both converged, but differ."""
-    words = (
-        f"two exact integrations differ by {difference:.1g}: its edges do not quite meet, by the file's own "
-        "tolerances, and no finer integration helps"
+    words = message(
+        "two exact integrations differ by {difference}: its edges do not quite meet, by "
+        "the file's own tolerances, and no finer integration helps",
+        difference=f"{difference:.1g}",
     )
     return Note(GeometryCode.NOT_CONVERGENT, words)
 
@@ -116,30 +129,36 @@ def mesh_notes(deviation: float | None, missing: int) -> list[Note]:
     triangles.
     """
     if deviation is not None and deviation > MESH_TOLERANCE:
-        message = (
-            f"its surface mesh encloses a volume that differs by {deviation:.1%}: the geometry is bad, "
-            "and so may be its mass"
+        text = message(
+            "its surface mesh encloses a volume that differs by {deviation}: the geometry is "
+            "bad, and so may be its mass",
+            deviation=f"{deviation:.1%}",
         )
-        return [Note(GeometryCode.MESH_MISMATCH, message)]
+        return [Note(GeometryCode.MESH_MISMATCH, text)]
     if deviation is None and missing:
-        message = f"{missing} of its faces cannot be meshed, so its volume could not be cross-checked"
-        return [Note(GeometryCode.MESH_MISMATCH, message)]
+        text = message(
+            "{missing} of its faces cannot be meshed, so its volume could not be cross-checked",
+            missing=missing,
+        )
+        return [Note(GeometryCode.MESH_MISMATCH, text)]
     return []
 
 
 def no_solid(measured: Measured) -> Note:
     """Note why a product has no volume."""
     if measured.has_faces or measured.has_wires:
-        what = "surfaces that enclose no solid" if measured.has_faces else "curves only"
-        return Note(GeometryCode.NO_SOLID, f"it consists of {what}, so it has no volume")
-    return Note(GeometryCode.NO_GEOMETRY, "the file holds no solid and no surface for it")
+        what = message("surfaces that enclose no solid") if measured.has_faces else message("curves only")
+        return Note(GeometryCode.NO_SOLID, message("it consists of {what}, so it has no volume", what=what))
+    return Note(GeometryCode.NO_GEOMETRY, message("the file holds no solid and no surface for it"))
 
 
 def shell_note(shells: int, solids: int) -> Note:
     """Note surfaces that close and were taken for solids."""
     what = counted(shells, "closed surface", "closed surfaces")
-    beside = ", beside its solids" if solids else ""
-    words = f"{what}, no solid in the file{beside}: the volume inside was taken"
+    beside = message(", beside its solids") if solids else ""
+    words = message(
+        "{what}, no solid in the file{beside}: the volume inside was taken", what=what, beside=beside
+    )
     return Note(GeometryCode.SHELL_VOLUME, words)
 
 
@@ -170,20 +189,30 @@ def loose_notes(surfaces: Sequence[Mesh], bodies: Sequence[Body], solids: Sequen
     if not solids or lost <= COSMETIC * sum(solid.volume_m3 for solid in solids):
         return []
     what = counted(len(left), "surface that does not close", "surfaces that do not close")
-    words = f"beside its solids there are {what}: if they are a body, some {lost * 1e6:.3g} cm³ are missing"
+    words = message(
+        "beside its solids there are {what}: if they are a body, some {lost} cm³ are missing",
+        what=what,
+        lost=f"{lost * 1000000.0:.3g}",
+    )
     return [Note(GeometryCode.BODY_MISSING, words)]
 
 
 def lost_note(names: Sequence[str]) -> Note:
     """Note bodies of a FreeCAD part that have no shape."""
-    what = "has no shape: its" if len(names) == 1 else "have no shape: their"
-    words = f"{listed(names, 4)} {what} volume is missing; recompute the file, or make a solid of a mesh"
+    what = message("has no shape: its") if len(names) == 1 else message("have no shape: their")
+    words = message(
+        "{names} {what} volume is missing; recompute the file, or make a solid of a mesh",
+        names=listed(names, 4),
+        what=what,
+    )
     return Note(GeometryCode.BODY_MISSING, words)
 
 
 def open_note(edges: int) -> Note:
     """Note a solid whose faces do not close, or disagree on what is outside."""
-    words = f"its faces do not close ({counted(edges, 'open edge')}), so it has no exact volume"
+    words = message(
+        "its faces do not close ({edges}), so it has no exact volume", edges=counted(edges, "open edge")
+    )
     return Note(GeometryCode.OPEN_SHELL, words)
 
 
@@ -195,9 +224,10 @@ def drift_note(drift: float) -> Note | None:
     """
     if drift <= STATED:
         return None
-    words = (
-        "its faces do not meet at their edges, by the file's own tolerances: its volume may be off by "
-        f"{drift:.1g} of it"
+    words = message(
+        "its faces do not meet at their edges, by the file's own tolerances: its volume "
+        "may be off by {drift} of it",
+        drift=f"{drift:.1g}",
     )
     return Note(GeometryCode.NOT_CONVERGENT if drift <= TORN else GeometryCode.OPEN_SHELL, words)
 
@@ -208,9 +238,11 @@ TORN = 1e-3
 
 def cavity_note(together: Together) -> Note:
     """Note that solids were taken as cavities of others."""
-    words = (
-        "some solids of this product are inside out and some are not: "
-        f"{together.cavities} taken as cavities of the solid around them, {together.turned} as bodies"
+    words = message(
+        "some solids of this product are inside out and some are not: {cavities} taken "
+        "as cavities of the solid around them, {turned} as bodies",
+        cavities=together.cavities,
+        turned=together.turned,
     )
     return Note(GeometryCode.NEGATIVE_VOLUME, words)
 
@@ -228,7 +260,11 @@ def implausible_size(prototypes: Mapping[str, Prototype], unit: str) -> list[Not
     return [
         Note(
             GeometryCode.UNITS,
-            f"read in {unit}, the largest part measures {max(extents):.3g} m: was another unit meant?",
+            message(
+                "read in {unit}, the largest part measures {extents} m: was another unit meant?",
+                unit=unit,
+                extents=f"{max(extents):.3g}",
+            ),
         )
     ]
 
@@ -251,15 +287,16 @@ def placement_problems(instances: Sequence[Instance]) -> list[Note]:
         seen.add(here)
     problems = []
     if scaled:
-        words = (
-            f"placements that scale their part: {_some(scaled)}; "
-            "volume and inertia are scaled with it, a mass from the BOM is not"
+        words = message(
+            "placements that scale their part: {scaled}; volume and inertia are scaled with "
+            "it, a mass from the BOM is not",
+            scaled=_some(scaled),
         )
         problems.append(Note(GeometryCode.SCALED, words))
     if twice:
-        words = (
-            f"parts that stand exactly where the same part stands already: {_some(twice)}; "
-            "all of them are counted"
+        words = message(
+            "parts that stand exactly where the same part stands already: {twice}; all of them are counted",
+            twice=_some(twice),
         )
         problems.append(Note(GeometryCode.COINCIDENT_PARTS, words))
     return problems
@@ -292,17 +329,23 @@ def assembled(
 
 def face_rebuilt_note(faces: int, before_m3: float, after_m3: float) -> Note:
     """Note spherical faces that the kernel misread, and that another reading of the file gave right."""
-    words = (
-        f"the geometry kernel misread {counted(faces, 'spherical face')} ({before_m3 * 1e6:.4g} cm³); read "
-        f"with another axis, as the edges in the file say, the volume is {after_m3 * 1e6:.4g} cm³"
+    words = message(
+        "the geometry kernel misread {faces} ({before_m3} cm³); read with another axis, "
+        "as the edges in the file say, the volume is {after_m3} cm³",
+        faces=counted(faces, "spherical face"),
+        before_m3=f"{before_m3 * 1000000.0:.4g}",
+        after_m3=f"{after_m3 * 1000000.0:.4g}",
     )
     return Note(GeometryCode.FACE_REBUILT, words)
 
 
 def face_differs_note(faces: int, doubt_m3: float, volume_m3: float) -> Note:
     """Note curved faces that do not lie between their edges."""
-    words = (
-        f"{counted(faces, 'curved face does', 'curved faces do')} not lie between the edges that the "
-        f"file has: some {doubt_m3 * 1e6:.3g} of {volume_m3 * 1e6:.4g} cm³ are in doubt"
+    words = message(
+        "{faces} not lie between the edges that the file has: some {doubt_m3} of "
+        "{volume_m3} cm³ are in doubt",
+        faces=counted(faces, "curved face does", "curved faces do"),
+        doubt_m3=f"{doubt_m3 * 1000000.0:.3g}",
+        volume_m3=f"{volume_m3 * 1000000.0:.4g}",
     )
     return Note(GeometryCode.FACE_DIFFERS, words)

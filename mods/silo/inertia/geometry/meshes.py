@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from silo.bom.errors import ConfigError, DocumentError, counted
+from silo.bom.message import message
 from silo.bounded_json import read_json
 from silo.budget import Budget, OverBudgetError
 from silo.inertia.assembly import Prototype
@@ -65,7 +66,7 @@ def read_mesh(path: Path, kind: Format, options: ReadOptions, report: Report) ->
     with np.errstate(over="ignore", invalid="ignore"):  # what comes of it is checked
         unfolded = unfold(scene.nodes, scene.roots, options.max_instances)
     for instance in unfolded.instances:
-        _check(path, f"the placement of '{instance.name}'", instance.transform)
+        _check(path, message("the placement of '{name}'", name=instance.name), instance.transform)
     unfolded.instances = [replace(i, transform=in_metres(i.transform, unit)) for i in unfolded.instances]
     unfolded.frames = {path: in_metres(frame, unit) for path, frame in unfolded.frames.items()}
     prototypes = {}
@@ -91,8 +92,12 @@ def checked_mesh(path: Path, what: str, vertices: ArrayLike, faces: ArrayLike) -
 
 def _check(path: Path, what: str, numbers: Floats) -> None:
     if not (np.abs(numbers) <= MAX_COORDINATE).all():  # NaN is no more so than infinity
-        reason = f"{what} has numbers that are not finite, or larger than {MAX_COORDINATE:g}"
-        raise DocumentError(str(path), f"{reason}; repair the file or export it again")
+        reason = message(
+            "{what} has numbers that are not finite, or larger than {max_coordinate}",
+            what=what,
+            max_coordinate=f"{MAX_COORDINATE:g}",
+        )
+        raise DocumentError(str(path), message("{reason}; repair the file or export it again", reason=reason))
 
 
 def mesh_scene(path: Path, kind: Format) -> MeshScene:
@@ -103,10 +108,10 @@ def mesh_scene(path: Path, kind: Format) -> MeshScene:
         import trimesh
     except ImportError as error:  # pragma: no cover - the development environment always has it
         raise ConfigError(
-            'mesh files need trimesh, which is not installed: pip install "silo-mod[inertia]"'
+            message('mesh files need trimesh, which is not installed: pip install "silo-mod[inertia]"')
         ) from error
     if kind is Format.PLY and _is_cut_off(path.read_bytes()):
-        raise DocumentError(str(path), "the file ends in the middle; export or copy it again")
+        raise DocumentError(str(path), message("the file ends in the middle; export or copy it again"))
     if kind is Format.GLB:
         _count_claims(path)
     try:
@@ -117,7 +122,9 @@ def mesh_scene(path: Path, kind: Format) -> MeshScene:
     except MemoryError:
         raise
     except Exception as error:
-        raise DocumentError(str(path), f"cannot be read as {kind.value}: {error}") from error
+        raise DocumentError(
+            str(path), message("cannot be read as {value}: {error}", value=kind.value, error=error)
+        ) from error
     return _from_trimesh(path, kind, loaded)
 
 
@@ -137,10 +144,10 @@ def _from_trimesh(path: Path, kind: Format, loaded: Any) -> MeshScene:
         faces = getattr(geometry, "faces", None)
         if faces is None or not len(faces):
             continue
-        meshes[name] = checked_mesh(path, f"the mesh '{name}'", geometry.vertices, faces)
+        meshes[name] = checked_mesh(path, message("the mesh '{name}'", name=name), geometry.vertices, faces)
         nodes[name] = Node(name, path.stem if len(loaded.geometry) == 1 else name, (), True)
     if not meshes:
-        raise DocumentError(str(path), "holds no triangles")
+        raise DocumentError(str(path), message("holds no triangles"))
     roots = _tree(loaded.graph, nodes)
     glb = kind is Format.GLB
     if kind is Format.DAE:
@@ -174,9 +181,9 @@ def _glb_json(data: bytes, path: Path) -> dict[str, Any]:
     except OverBudgetError:
         raise
     except ValueError as error:
-        raise DocumentError(str(path), f"cannot be read as glb: {error}") from error
+        raise DocumentError(str(path), message("cannot be read as glb: {error}", error=error)) from error
     if not isinstance(scene, dict):
-        raise DocumentError(str(path), "cannot be read as glb: its JSON is no object")
+        raise DocumentError(str(path), message("cannot be read as glb: its JSON is no object"))
     return scene
 
 
@@ -221,11 +228,16 @@ def _unread(data: bytes, glb: bool, read: int) -> list[Note]:
         listed = sum(max(len(line) - 3, 0) if line[0] == b"f" else 1 for line in lines)
     notes = []
     if read < listed:
-        what = "placed meshes" if glb else "triangles and free-form surfaces"
-        words = f"the file has {listed} {what}, and {read} were read: volume is missing"
+        what = message("placed meshes") if glb else message("triangles and free-form surfaces")
+        words = message(
+            "the file has {listed} {what}, and {read} were read: volume is missing",
+            listed=listed,
+            what=what,
+            read=read,
+        )
         notes.append(Note(GeometryCode.BODY_MISSING, words))
     if left_out:
-        words = f"{counted(left_out, 'node')} of the file in no scene: left out"
+        words = message("{left_out} of the file in no scene: left out", left_out=counted(left_out, "node"))
         notes.append(Note(GeometryCode.NOT_COUNTED, words))
     return notes
 
@@ -259,13 +271,19 @@ def _tree(graph: Any, nodes: dict[str, Node]) -> tuple[Child, ...]:
 def _unit(scene: MeshScene, options: ReadOptions) -> tuple[float, str, list[Note]]:
     if options.mesh_unit is not None:
         if options.mesh_unit not in MESH_UNITS:
-            raise ConfigError(f"mesh_unit: wanted one of {', '.join(MESH_UNITS)}, got '{options.mesh_unit}'")
+            raise ConfigError(
+                message(
+                    "mesh_unit: wanted one of {mesh_units}, got '{mesh_unit}'",
+                    mesh_units=", ".join(MESH_UNITS),
+                    mesh_unit=options.mesh_unit,
+                )
+            )
         return MESH_UNITS[options.mesh_unit], options.mesh_unit, []
     if scene.unit_m is not None:
         return scene.unit_m, scene.unit_name, []
     problem = Note(
         GeometryCode.UNITS,
-        "the format states no unit of length; read as mm. Name the unit if it is another",
+        message("the format states no unit of length; read as mm. Name the unit if it is another"),
     )
     return MESH_UNITS["mm"], "mm", [problem]
 
@@ -317,17 +335,19 @@ def read_3mf(path: Path, budget: Budget = MESH) -> MeshScene:
         with zipfile.ZipFile(path) as archive:
             return _Package(path, archive, budget).scene()
     except zipfile.BadZipFile as error:
-        raise DocumentError(str(path), f"is a damaged zip file ({error}); save it again") from error
+        raise DocumentError(
+            str(path), message("is a damaged zip file ({error}); save it again", error=error)
+        ) from error
 
 
-_NOT_CUT = "a negative volume could not be subtracted"
+_NOT_CUT = message("a negative volume could not be subtracted")
 
 
 class _Package:
     def __init__(self, path: Path, archive: zipfile.ZipFile, budget: Budget) -> None:
         self._path = path
         self._archive = archive
-        self._account = budget.account("the model")
+        self._account = budget.account(message("the model"))
         self._models: dict[str, _Model] = {}
         self._meshes: dict[str, Mesh] = {}
         self._nodes: dict[str, Node] = {}
@@ -347,14 +367,23 @@ class _Package:
             key = self._add(part or root, number, ())
             roots.append(Child(self._nodes[key].name, key, transform))
         if not roots:
-            self._fail("builds nothing: no object is listed to be made")
+            self._fail(message("builds nothing: no object is listed to be made"))
         if model.unit not in MESH_UNITS:
-            self._fail(f"states the unit '{model.unit}', which 3MF does not know")
+            self._fail(message("states the unit '{unit}', which 3MF does not know", unit=model.unit))
         unit_m = MESH_UNITS[model.unit]
         for number, obj in model.objects.items():
             if _key(root, number) not in self._reached and obj.kind in _PART:
-                why = "is marked as not printed" if number in model.unprinted else "is built by nothing"
-                self._say("", f"object {number} “{obj.name}” {why}: left out")
+                why = (
+                    message("is marked as not printed")
+                    if number in model.unprinted
+                    else message("is built by nothing")
+                )
+                self._say(
+                    "",
+                    message(
+                        "object {number} “{name}” {why}: left out", number=number, name=obj.name, why=why
+                    ),
+                )
         return MeshScene(self._meshes, self._nodes, tuple(roots), model.unit, unit_m, self._said)
 
     def _say(self, key: str, words: str, code: GeometryCode = GeometryCode.NOT_COUNTED) -> None:
@@ -372,7 +401,15 @@ class _Package:
         if obj is None or word in (*_PART, *_NEGATIVE):
             return False
         name = f" “{obj.name}”" if obj.name else ""
-        self._say("", f"object {number}{name} is not the part ({word}): left out")
+        self._say(
+            "",
+            message(
+                "object {number}{name} is not the part ({word}): left out",
+                number=number,
+                name=name,
+                word=word,
+            ),
+        )
         return True
 
     def _root(self) -> str:
@@ -384,14 +421,16 @@ class _Package:
                 return finder.target.lstrip("/")
         models = [name for name in names if name.lower().endswith(".model")]
         if not models:
-            self._fail("holds no 3D model")
+            self._fail(message("holds no 3D model"))
         return models[0]
 
     def _model(self, name: str) -> _Model:
         name = name.lstrip("/")
         if name not in self._models:
             if len(self._models) >= MAX_MODELS:
-                self._fail(f"is spread over more than {MAX_MODELS} model files")
+                self._fail(
+                    message("is spread over more than {max_models} model files", max_models=MAX_MODELS)
+                )
             reader = _ModelReader()
             self._parse(name, reader.start, reader.text)
             self._models[name] = reader.model
@@ -400,12 +439,12 @@ class _Package:
     def _add(self, part: str, number: str, inside: tuple[str, ...]) -> str:
         key = _key(part, number)
         if key in inside:
-            self._fail(f"its object {number} contains itself")
+            self._fail(message("its object {number} contains itself", number=number))
         if key in self._nodes:
             return key
         obj = self._model(part).objects.get(number)
         if obj is None:
-            self._fail(f"refers to an object {number} that it does not hold")
+            self._fail(message("refers to an object {number} that it does not hold", number=number))
         children: list[Child] = []
         cuts: list[Mesh] = []
         for other, child, transform in obj.components:
@@ -420,24 +459,40 @@ class _Package:
                 cuts.append(self._meshes[child_key].moved(transform))
             else:
                 self._say(
-                    "", f"the negative volume {child} is an assembly: {_NOT_CUT}", GeometryCode.INVALID_SHAPE
+                    "",
+                    message(
+                        "the negative volume {child} is an assembly: {not_cut}", child=child, not_cut=_NOT_CUT
+                    ),
+                    GeometryCode.INVALID_SHAPE,
                 )
         faces = dict(enumerate(obj.faces))
         for kind, first, last in self._slicer.volumes.get(number, ()):
             if kind not in _PART:
                 taken = [faces.pop(row) for row in range(first, last + 1) if row in faces]
                 if kind not in _NEGATIVE:
-                    self._say("", f"a volume of object {number} is not the part ({kind}): left out")
+                    self._say(
+                        "",
+                        message(
+                            "a volume of object {number} is not the part ({kind}): left out",
+                            number=number,
+                            kind=kind,
+                        ),
+                    )
                 elif taken:
                     cuts.append(self._mesh(number, obj.vertices, taken))
         if faces:
             self._meshes[key] = self._mesh(number, obj.vertices, list(faces.values()))
             self._carve(key, cuts)
         if obj.lattice or not (faces or obj.components):
-            what = "beams, which are not measured" if obj.lattice else "no triangles"
-            words = f"object {number} “{obj.name}” has {what}: its volume is missing"
+            what = message("beams, which are not measured") if obj.lattice else message("no triangles")
+            words = message(
+                "object {number} “{name}” has {what}: its volume is missing",
+                number=number,
+                name=obj.name,
+                what=what,
+            )
             self._say("", words, GeometryCode.BODY_MISSING)
-        name = obj.name or (self._path.stem if not inside else f"object {number}")
+        name = obj.name or (self._path.stem if not inside else message("object {number}", number=number))
         whole = tuple(self._carved(key, child, cuts) for child in children)
         self._nodes[key] = Node(key, name, whole, bool(faces))
         return key
@@ -447,7 +502,7 @@ class _Package:
         own.
         """
         if cuts and child.product not in self._meshes:
-            words = f"“{child.name}” is an assembly: {_NOT_CUT} from it"
+            words = message("“{name}” is an assembly: {not_cut} from it", name=child.name, not_cut=_NOT_CUT)
             self._say("", words, GeometryCode.INVALID_SHAPE)
         if not cuts or child.product not in self._meshes:
             return child
@@ -461,17 +516,19 @@ class _Package:
     def _carve(self, key: str, cuts: Sequence[Mesh]) -> None:
         for cut in cuts:
             if (carved := without(self._meshes[key], cut)) is None:
-                words = f"the mesh or the volume does not close: {_NOT_CUT}"
+                words = message("the mesh or the volume does not close: {not_cut}", not_cut=_NOT_CUT)
                 self._say(key, words, GeometryCode.INVALID_SHAPE)
             else:
                 self._meshes[key] = carved
-                self._say(key, "the slicer's negative volume was subtracted")
+                self._say(key, message("the slicer's negative volume was subtracted"))
 
     def _mesh(self, number: str, vertices: Sequence[Corner], rows: Sequence[tuple[int, int, int]]) -> Mesh:
         faces = np.array(rows, dtype=np.int64)
         if faces.min() < 0 or faces.max() >= len(vertices):
-            self._fail(f"its object {number} has triangles of vertices that it does not hold")
-        return checked_mesh(self._path, f"its object {number}", vertices, faces)
+            self._fail(
+                message("its object {number} has triangles of vertices that it does not hold", number=number)
+            )
+        return checked_mesh(self._path, message("its object {number}", number=number), vertices, faces)
 
     def _parse(
         self,
@@ -495,12 +552,12 @@ class _Package:
             with self._archive.open(info) as stream:
                 parser.ParseFile(stream)
         except KeyError:
-            self._fail(f"names a part {name} that it does not hold")
+            self._fail(message("names a part {name} that it does not hold", name=name))
         except (expat.ExpatError, ValueError, zipfile.BadZipFile, EOFError) as error:
-            self._fail(f"its part {name} is damaged: {error}")
+            self._fail(message("its part {name} is damaged: {error}", name=name, error=error))
 
     def _doctype(self, *_: object) -> NoReturn:
-        self._fail("declares a document type, which no 3MF file does; it is not read")
+        self._fail(message("declares a document type, which no 3MF file does; it is not read"))
 
     def _fail(self, reason: str) -> NoReturn:
         raise DocumentError(str(self._path), reason)
@@ -584,7 +641,7 @@ def _matrix(text: str) -> Floats:
     if text.strip():
         numbers = np.array([float(word) for word in text.split()])
         if numbers.size != 12 or not np.isfinite(numbers).all():
-            raise ValueError(f"a transform needs 12 numbers, got '{text[:60]}'")
+            raise ValueError(message("a transform needs 12 numbers, got '{text}'", text=text[:60]))
         matrix[:3, :] = numbers.reshape(4, 3).T
     return matrix
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 import unicodedata
 
+from silo.bom.message import message
 from silo.inertia.notes import GeometryCode, Note
 
 _GENERIC = re.compile(r"(?:(?:SOLID|COMPOUND|COMPSOLID|SHELL|FACE|WIRE|EDGE|VERTEX)(?:_?\d+)?|=>\[[\d:]*\])?")
@@ -22,7 +23,7 @@ def lost_characters(name: str) -> list[Note]:
     """Note "?" and U+FFFD, which exporters write for characters that they lack ("Peça" → "Pe?a")."""
     if "?" not in name and "\ufffd" not in name:
         return []
-    words = f"characters of its name were lost in the export: '{name}'"
+    words = message("characters of its name were lost in the export: '{name}'", name=name)
     return [Note(GeometryCode.NAME, words)]
 
 

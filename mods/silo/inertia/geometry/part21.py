@@ -22,6 +22,7 @@ from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 from silo.bom.errors import InputError
+from silo.bom.message import message
 from silo.inertia.geometry.graph import IDENTITY, Child, Node, bottom_up, count_instances
 from silo.inertia.geometry.part_files import bare_stem
 
@@ -202,7 +203,7 @@ def number(value: Value) -> float | None:
 def _parsed(body: bytes) -> tuple[Value, ...]:
     values, end = _list(body, 0, 0)
     if body[end:].strip():
-        raise InputError("text after the closing bracket of an entity")
+        raise InputError(message("text after the closing bracket of an entity"))
     # A complex entity is a row of Typed without commas; a simple one a list of arguments.
     return values
 
@@ -210,13 +211,15 @@ def _parsed(body: bytes) -> tuple[Value, ...]:
 def _list(body: bytes, position: int, depth: int) -> tuple[tuple[Value, ...], int]:
     """Parse the bracketed list at ``position``. Returns its values, and the position after it."""
     if depth > MAX_DEPTH:
-        raise InputError(f"an entity nests its brackets more than {MAX_DEPTH} deep")
+        raise InputError(
+            message("an entity nests its brackets more than {max_depth} deep", max_depth=MAX_DEPTH)
+        )
     values: list[Value] = []
     position = _mark(body, position, b"(")
     while True:
         match = _TOKEN.match(body, position)
         if match is None:
-            raise InputError("an entity ends before its brackets are closed")
+            raise InputError(message("an entity ends before its brackets are closed"))
         kind, token = match.lastgroup, match[match.lastgroup or 0]
         position = match.end()
         if kind == "mark" and token == b")":
@@ -234,7 +237,13 @@ def _list(body: bytes, position: int, depth: int) -> tuple[tuple[Value, ...], in
 def _mark(body: bytes, position: int, mark: bytes) -> int:
     match = _TOKEN.match(body, position)
     if match is None or match["mark"] != mark:
-        raise InputError(f"wanted {mark.decode()} in an entity, got {body[position : position + 10]!r}")
+        raise InputError(
+            message(
+                "wanted {mark} in an entity, got {position}",
+                mark=mark.decode(),
+                position=repr(body[position : position + 10]),
+            )
+        )
     return match.end()
 
 
@@ -656,15 +665,18 @@ def _density(source: Part21, item: tuple[Value, ...]) -> tuple[float | None, str
     value = number(item[1]) if len(item) > 1 else None
     factor = _unit(source, ref(item, 2) or 0)
     if value is None or factor is None:
-        return None, "a density is given, but its unit cannot be read; it is not used"
+        return None, message("a density is given, but its unit cannot be read; it is not used")
     density = value * factor
     # Late: few files state a density, and this loads the tables.
     from silo.inertia.materials.densities import DENSEST, LIGHTEST
 
     if not LIGHTEST <= density <= DENSEST:
         return None, (
-            f"a density of {density:.4g} kg/m3 is given, which no material has; its unit must be wrong, and "
-            "it is not used"
+            message(
+                "a density of {density} kg/m3 is given, which no material has; its unit must be "
+                "wrong, and it is not used",
+                density=f"{density:.4g}",
+            )
         )
     return density, ""
 

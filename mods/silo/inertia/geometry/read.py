@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from silo.bom.errors import CancelledError, ConfigError, DocumentError, InputError
+from silo.bom.message import message
 from silo.inertia.assembly import Assembly
 from silo.inertia.geometry.cache import Cache, changed_since, default_folder, key_of
 from silo.inertia.geometry.child import run
@@ -62,7 +63,10 @@ def read(path: str | Path, *, options: ReadOptions | None = None) -> Assembly:
                 kept.put(key, result)
         return assembly
     raise DocumentError(
-        str(path), f"changed while it was read, {ATTEMPTS} times; read it when nobody writes to it"
+        str(path),
+        message(
+            "changed while it was read, {attempts} times; read it when nobody writes to it", attempts=ATTEMPTS
+        ),
     )
 
 
@@ -120,7 +124,7 @@ def _reading(path: Path, options: ReadOptions, report: Report, helpers: Helpers)
 def _reporter(path: Path, options: ReadOptions) -> Report:
     def report(stage: str, done: int, total: int) -> None:
         if options.cancelled is not None and options.cancelled():
-            raise CancelledError(f"{path}: reading was cancelled")
+            raise CancelledError(message("{path}: reading was cancelled", path=path))
         if options.progress is not None:
             options.progress(Progress(stage, done, total))
 

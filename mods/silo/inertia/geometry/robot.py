@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from silo.bom.errors import DocumentError, InputError
+from silo.bom.message import message
 from silo.inertia.assembly import Instance, Prototype
 from silo.inertia.geometry.formats import detect
 from silo.inertia.geometry.graph import Unfolded, in_metres, unfold
@@ -53,7 +54,7 @@ def read_robot(path: Path, options: ReadOptions, report: Report) -> GeometryRead
         unfolded.instances.append(Instance((link, name), (link, prototype.name), prototype.key, place))
         unfolded.frames[(link,)] = urdf.frames[link]
     if not unfolded.instances:
-        raise DocumentError(str(path), "none of its links has a shape that can be measured")
+        raise DocumentError(str(path), message("none of its links has a shape that can be measured"))
     assembly = assembled(
         unfolded, found.prototypes, found.problems, name=urdf.robot or path.stem, source=str(path), unit="m"
     )
@@ -62,7 +63,9 @@ def read_robot(path: Path, options: ReadOptions, report: Report) -> GeometryRead
 
 def _origin(path: Path, link: str, shape: UrdfShape) -> Floats:
     if len(shape.xyz) != 3 or len(shape.rpy) != 3 or not np.isfinite([*shape.xyz, *shape.rpy]).all():
-        reason = f"a shape of the link {link} has no readable origin; wanted three numbers each"
+        reason = message(
+            "a shape of the link {link} has no readable origin; wanted three numbers each", link=link
+        )
         raise DocumentError(str(path), reason)
     return origin_frame(list(shape.xyz), list(shape.rpy))
 
@@ -92,14 +95,16 @@ class _Shapes:
         name = Path(named.replace("\\", "/")).stem or "mesh"
         file = found_mesh(self.path, named)
         if file is None:
-            words = f"its mesh {named} is not there, beside the URDF or in a package around it"
+            words: str = message(
+                "its mesh {named} is not there, beside the URDF or in a package around it", named=named
+            )
             self.absent.append(self.path.parent / Path(named).name)
             return Prototype(key, name, has_solid=False, problems=(Note(GeometryCode.NOT_READ, words),))
         try:
             scale = _values(self.path, shape, "scale", 3) if "scale" in shape.values else np.ones(3)
             mesh, notes = self._joined(file)
         except DocumentError as error:
-            words = f"its mesh cannot be read: {error}"
+            words = message("its mesh cannot be read: {error}", error=error)
             return Prototype(key, name, has_solid=False, problems=(Note(GeometryCode.NOT_READ, words),))
         self.files.append(file)
         faces = mesh.faces[:, ::-1] if scale.prod() < 0 else mesh.faces
@@ -138,7 +143,16 @@ def _values(path: Path, shape: UrdfShape, name: str, count: int) -> Floats:
     except ValueError:
         numbers = np.zeros(0)
     if len(numbers) != count or not np.isfinite(numbers).all():
-        raise DocumentError(str(path), f"a {shape.kind} has {name}=“{text}”, wanted {count} numbers")
+        raise DocumentError(
+            str(path),
+            message(
+                "a {kind} has {name}=“{text}”, wanted {count} numbers",
+                kind=shape.kind,
+                name=name,
+                text=text,
+                count=count,
+            ),
+        )
     return numbers
 
 
@@ -148,17 +162,17 @@ def _primitive(path: Path, key: str, shape: UrdfShape) -> Prototype:
         x, y, z = _values(path, shape, "size", 3)
         volume = x * y * z
         diagonal = np.array([y * y + z * z, x * x + z * z, x * x + y * y]) / 12
-        name = f"box {x:g} × {y:g} × {z:g} m"
+        name = message("box {x} × {y} × {z} m", x=f"{x:g}", y=f"{y:g}", z=f"{z:g}")
     elif shape.kind == "sphere":
         (r,) = _values(path, shape, "radius", 1)
         volume, diagonal = 4 / 3 * math.pi * r**3, np.full(3, 2 / 5 * r * r)
-        name = f"sphere r {r:g} m"
+        name = message("sphere r {r} m", r=f"{r:g}")
     elif shape.kind in ("cylinder", "capsule"):
         (r,), (length,) = _values(path, shape, "radius", 1), _values(path, shape, "length", 1)
         volume = math.pi * r * r * length
         across = (3 * r * r + length * length) / 12
         diagonal = np.array([across, across, r * r / 2])
-        name = f"{shape.kind} r {r:g} × {length:g} m"
+        name = message("{kind} r {r} × {length} m", kind=shape.kind, r=f"{r:g}", length=f"{length:g}")
         if shape.kind == "capsule":
             ends = 4 / 3 * math.pi * r**3
             beside = 2 / 5 * r * r + length * length / 4 + 3 / 8 * length * r
@@ -167,7 +181,7 @@ def _primitive(path: Path, key: str, shape: UrdfShape) -> Prototype:
             )
             volume += ends
     else:
-        words = f"a shape of the kind “{shape.kind}” cannot be measured"
+        words = message("a shape of the kind “{kind}” cannot be measured", kind=shape.kind)
         return Prototype(
             key, shape.kind or "shape", has_solid=False, problems=(Note(GeometryCode.NOT_READ, words),)
         )

@@ -53,6 +53,7 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.XCAFDoc import XCAFDoc_Centroid, XCAFDoc_DocumentTool, XCAFDoc_Volume
 
 from silo.bom.errors import DocumentError, InputError, counted, listed
+from silo.bom.message import message
 from silo.inertia.assembly import Prototype
 from silo.inertia.geometry import kernel as occt
 from silo.inertia.geometry.graph import Child, Node, bottom_up, in_metres, unfold
@@ -91,7 +92,9 @@ def read_step(
     """
     report("reading", 0, 0)
     step = load(path, max_instances=options.max_instances, text=text() if text is not None else None)
-    siblings = Siblings(step, options, helpers, lambda name: report(f"reading {name}", 0, 0))
+    siblings = Siblings(
+        step, options, helpers, lambda name: report(message("reading {name}", name=name), 0, 0)
+    )
     siblings.resolve()
     unfolded = unfold(step.nodes, step.roots, options.max_instances)
     unmeasured = [key for key in unfolded.placed if key not in step.measured]
@@ -114,8 +117,8 @@ def read_step(
 def unitless(step: StepFile, prototypes: Mapping[str, Prototype]) -> Iterator[Note]:
     """Note products whose lengths have no unit: the kernel takes mm, or, in an assembly, reads nothing."""
     for read, what in (
-        (True, "mm are taken"),
-        (False, "their bodies cannot be read; export them with a unit"),
+        (True, message("mm are taken")),
+        (False, message("their bodies cannot be read; export them with a unit")),
     ):
         names = [
             f"“{step.nodes[key].name}”"
@@ -124,8 +127,9 @@ def unitless(step: StepFile, prototypes: Mapping[str, Prototype]) -> Iterator[No
             and ((read and not step.unit) or (step.facts[key].bodies and not step.facts[key].unit_mm))
         ]
         if names:
-            words = (
-                f"the file states no unit of length that is understood for {listed(names, 4)}; without one, "
+            words = message(
+                "the file states no unit of length that is understood for {names}; without one, ",
+                names=listed(names, 4),
             )
             yield Note(GeometryCode.UNITS, words + what)
 
@@ -142,7 +146,7 @@ def _prototype(step: StepFile, key: str, note: Note | None) -> Prototype:
     if facts.density_problem:
         problems.append(Note(GeometryCode.UNITS, facts.density_problem))
     if key in step.unnamed:
-        words = f"it has no name in the file; called '{node.name}' after what holds it"
+        words = message("it has no name in the file; called '{name}' after what holds it", name=node.name)
         problems.append(Note(GeometryCode.NAME, words))
     return measured.prototype(
         key,
@@ -167,10 +171,16 @@ def against_stated(volume: float, com: Floats, stated: StatedInStep) -> list[Not
         problems.append(
             Note(
                 GeometryCode.STATED_VOLUME,
-                f"the file states a volume of {stated.volume_m3:.6g} m3, the geometry has {volume:.6g} m3 "
-                f"({volume / stated.volume_m3 - 1:+.2%})"
+                message(
+                    "the file states a volume of {volume_m3} m3, the geometry has {volume} m3 ({volume_m32})",
+                    volume_m3=f"{stated.volume_m3:.6g}",
+                    volume=f"{volume:.6g}",
+                    volume_m32=f"{volume / stated.volume_m3 - 1:+.2%}",
+                )
                 if stated.volume_m3
-                else f"the file states no volume, the geometry has {volume:.6g} m3",
+                else message(
+                    "the file states no volume, the geometry has {volume} m3", volume=f"{volume:.6g}"
+                ),
             )
         )
     if stated.centroid_m is not None:
@@ -179,7 +189,10 @@ def against_stated(volume: float, com: Floats, stated: StatedInStep) -> list[Not
             problems.append(
                 Note(
                     GeometryCode.STATED_CENTROID,
-                    f"the file states a centre of volume {distance * 1e3:.4g} mm away from the geometry's",
+                    message(
+                        "the file states a centre of volume {distance} mm away from the geometry's",
+                        distance=f"{distance * 1000.0:.4g}",
+                    ),
                 )
             )
     return problems
@@ -193,8 +206,11 @@ def split_problems(siblings: Siblings) -> list[Note]:
         problems.append(
             Note(
                 GeometryCode.EXTERNAL_FILE,
-                f"a split assembly: geometry read from {counted(len(siblings.used), 'file')} beside it "
-                f"({names})",
+                message(
+                    "a split assembly: geometry read from {used} beside it ({names})",
+                    used=counted(len(siblings.used), "file"),
+                    names=names,
+                ),
             )
         )
     if siblings.missing:
@@ -202,8 +218,12 @@ def split_problems(siblings: Siblings) -> list[Note]:
         problems.append(
             Note(
                 GeometryCode.NO_GEOMETRY,
-                f"{counted(len(siblings.missing), 'product')} without geometry, here or beside the file "
-                f"({names}); put their files into its folder, or export the assembly as one file",
+                message(
+                    "{missing} without geometry, here or beside the file ({names}); put their files "
+                    "into its folder, or export the assembly as one file",
+                    missing=counted(len(siblings.missing), "product"),
+                    names=names,
+                ),
             )
         )
     return problems
@@ -226,8 +246,13 @@ def stated_totals(step: StepFile, prototypes: Mapping[str, Prototype]) -> list[N
                 problems.append(
                     Note(
                         GeometryCode.STATED_VOLUME,
-                        f"the file states {stated:.6g} m3 for the assembly '{node.name}', "
-                        f"its parts add up to {volumes[key]:.6g} m3",
+                        message(
+                            "the file states {stated} m3 for the assembly '{name}', its parts add up to "
+                            "{key} m3",
+                            stated=f"{stated:.6g}",
+                            name=node.name,
+                            key=f"{volumes[key]:.6g}",
+                        ),
                     )
                 )
     return problems
@@ -368,9 +393,11 @@ def _transferred(source: Path, named: Path) -> tuple[Any, Any]:
     reader.SetLayerMode(False)
     reader.SetPropsMode(True)
     if reader.ReadFile(str(source)) != IFSelect_RetDone:
-        raise DocumentError(str(named), "the geometry kernel cannot read it as STEP; export it again")
+        raise DocumentError(
+            str(named), message("the geometry kernel cannot read it as STEP; export it again")
+        )
     if not reader.Transfer(document):
-        raise DocumentError(str(named), "holds no geometry that the kernel can transfer")
+        raise DocumentError(str(named), message("holds no geometry that the kernel can transfer"))
     return document, reader
 
 
@@ -406,7 +433,7 @@ class _StepWalk:
             self._visit_all(key, label)
             self._file.roots.append(Child(self._file.nodes[key].name, key))
         if not self._file.roots:
-            raise DocumentError(str(self._file.path), "holds no product and no shape")
+            raise DocumentError(str(self._file.path), message("holds no product and no shape"))
         self._complete()
         self._file.empty = [
             key
@@ -436,8 +463,10 @@ class _StepWalk:
             named += sum(len(facts.bodies) for facts in self._products.facts.values())
             solids = sum(len(occt.solids_of(shape)) for own in file.shapes.values() for shape in own)
             if solids < named:
-                words = (
-                    f"the file has {counted(named, 'body', 'bodies')}, {solids} were read: volume is missing"
+                words = message(
+                    "the file has {named}, {solids} were read: volume is missing",
+                    named=counted(named, "body", "bodies"),
+                    solids=solids,
                 )
                 file.said.append(Note(GeometryCode.BODY_MISSING, words))
             return
@@ -454,7 +483,9 @@ class _StepWalk:
                     file.nodes[key] = replace(file.nodes[key], has_geometry=True)
             if facts.hidden:
                 what = counted(facts.hidden, "of its bodies is", "of its bodies are")
-                words = f"{what} hidden in the file (INVISIBILITY), and counted like all others"
+                words = message(
+                    "{what} hidden in the file (INVISIBILITY), and counted like all others", what=what
+                )
                 notes.append(Note(GeometryCode.HIDDEN, words))
             file.problems[key] = tuple(notes)
 
@@ -604,7 +635,10 @@ class Siblings:
                     waiting += self._fill(key, path)
                 except DocumentError as error:
                     self.problems[key] = Note(
-                        GeometryCode.NOT_READ, f"its file {path.name} cannot be read: {error.reason}"
+                        GeometryCode.NOT_READ,
+                        message(
+                            "its file {name} cannot be read: {reason}", name=path.name, reason=error.reason
+                        ),
                     )
 
     def _load(self, wanted: list[Path]) -> None:
@@ -637,15 +671,21 @@ class Siblings:
                 break
         if not paths:
             return None, (
-                f"the file holds no geometry for it, and no file '{node.name}.STEP' lies in the folder"
+                message(
+                    "the file holds no geometry for it, and no file '{name}.STEP' lies in the folder",
+                    name=node.name,
+                )
                 if self._options.siblings
-                else "the file holds no geometry for it, and files beside it are not to be used"
+                else message("the file holds no geometry for it, and files beside it are not to be used")
             )
         nearest = min(len(p.parts) for p in paths)
         best = [p for p in paths if len(p.parts) == nearest]
         if len(best) > 1:
             names = ", ".join(str(p.relative_to(self._root)) for p in best)
-            return None, f"the file holds no geometry for it, and several files are named after it: {names}"
+            return None, message(
+                "the file holds no geometry for it, and several files are named after it: {names}",
+                names=names,
+            )
         return best[0], ""
 
     def _files(self) -> dict[str, list[Path]]:
@@ -662,7 +702,11 @@ class Siblings:
         part = self._loaded.get(path)
         if part is None:
             raise DocumentError(
-                str(path), f"more than {self._options.max_siblings} files belong to this assembly"
+                str(path),
+                message(
+                    "more than {max_siblings} files belong to this assembly",
+                    max_siblings=self._options.max_siblings,
+                ),
             )
         if isinstance(part, str):
             raise DocumentError(str(path), part)
@@ -684,7 +728,7 @@ class Siblings:
             bottom_up(self._top.nodes, key)
         except InputError as error:
             self._top.nodes[key] = node
-            raise DocumentError(str(path), "it contains the assembly that needs it") from error
+            raise DocumentError(str(path), message("it contains the assembly that needs it")) from error
         self._top.take_shape(key, roots[0].product if content is not None else "")
         if content is not None:
             here, there = self._top.facts[key], self._top.facts[roots[0].product]
@@ -730,7 +774,7 @@ _OPERATIONS = {
 def _given(value: Any) -> Any:
     # The kernel ends the process if it gets nothing.
     if value is None:
-        raise ValueError("the entity is not complete")
+        raise ValueError(message("the entity is not complete"))
     return value
 
 
@@ -772,7 +816,9 @@ class Bodies:
         entity, keyword = self._entity(number), self._products.solids[number][0]
         name = entity.Name() if hasattr(entity, "Name") else None
         what = f"{keyword} #{number}" + (f" “{name.ToCString()}”" if name and name.Length() else "")
-        words = f"the file has a body that could not be read as a solid, {what}: its volume is missing"
+        words = message(
+            "the file has a body that could not be read as a solid, {what}: its volume is missing", what=what
+        )
         return Note(GeometryCode.BODY_MISSING, words)
 
     def _entity(self, number: int) -> Any:
@@ -783,7 +829,7 @@ class Bodies:
         keyword = self._products.solids[number][0]
         word, parts = self._products.trees.get(number, ("", ()))
         if self._left < 0:
-            raise ValueError("its parts nest without end")
+            raise ValueError(message("its parts nest without end"))
         if keyword == "CSG_SOLID":
             return self._made(parts[0], factors)
         if keyword == "BOOLEAN_RESULT":

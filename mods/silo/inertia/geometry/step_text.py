@@ -21,6 +21,7 @@ from itertools import islice
 from pathlib import Path
 
 from silo.bom.errors import DocumentError, InputError
+from silo.bom.message import message
 from silo.inertia.geometry.helpers import WORTH_HELP, Helpers
 from silo.inertia.geometry.options import ReadOptions
 from silo.inertia.geometry.part21 import (
@@ -99,7 +100,8 @@ def prepare(path: Path, folder: Path, max_instances: int) -> Prepared:
         text = scan(data, WANTED | HIDING if data.find(b"INVISIBILITY") > 0 else WANTED)
         if not text.complete:
             raise DocumentError(
-                str(path), "the file ends in the middle (no END-ISO-10303-21); export or copy it again"
+                str(path),
+                message("the file ends in the middle (no END-ISO-10303-21); export or copy it again"),
             )
         products = read_products(text)
         _refuse_bombs(path, products, max_instances)
@@ -123,7 +125,12 @@ def _refuse_bombs(path: Path, products: Products, most: int) -> None:
     except InputError as error:
         raise DocumentError(str(path), str(error)) from error
     if count > most:
-        raise DocumentError(str(path), f"it unfolds to {count} placed parts, more than the {most} allowed")
+        raise DocumentError(
+            str(path),
+            message(
+                "it unfolds to {count} placed parts, more than the {most} allowed", count=count, most=most
+            ),
+        )
 
 
 GROUP_FROM = 1_000

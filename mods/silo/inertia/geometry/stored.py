@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from silo.bom.errors import InputError
+from silo.bom.message import message
 from silo.inertia.assembly import Assembly, Instance, Prototype
 from silo.inertia.geometry.together import Mesh
 from silo.inertia.notes import Note
@@ -58,7 +59,14 @@ def load(path: Path) -> tuple[Assembly, dict[str, Any]]:
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as arrays:
             return _assembly_in(arrays)
     except (OSError, ValueError, KeyError, IndexError, TypeError, EOFError, zipfile.BadZipFile) as error:
-        raise InputError(f"{path}: is not stored geometry of format {FORMAT}: {error}") from error
+        raise InputError(
+            message(
+                "{path}: is not stored geometry of format {format}: {error}",
+                path=path,
+                format=FORMAT,
+                error=error,
+            )
+        ) from error
 
 
 def _problems_out(problems: tuple[Note, ...]) -> list[list[str]]:
@@ -78,7 +86,13 @@ def _prototype_out(prototype: Prototype) -> dict[str, Any]:
 def _assembly_in(arrays: Any) -> tuple[Assembly, dict[str, Any]]:
     header = json.loads(bytes(arrays["header"]).decode("utf-8"))
     if header.get("format") != FORMAT:
-        raise InputError(f"wanted stored geometry of format {FORMAT}, got {header.get('format')!r}")
+        raise InputError(
+            message(
+                "wanted stored geometry of format {format}, got {header}",
+                format=FORMAT,
+                header=repr(header.get("format")),
+            )
+        )
     prototypes = [_prototype_in(n, row, arrays) for n, row in enumerate(header["prototypes"])]
     instances = tuple(
         Instance(tuple(path), tuple(products), prototypes[n].key, transform)

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from silo.bom.errors import counted
+from silo.bom.message import message
 from silo.inertia.assembly import SolidProps
 from silo.inertia.notes import GeometryCode, Note
 from silo.inertia.rigid import combine_arrays
@@ -406,7 +407,10 @@ def _without_copies(bodies: Sequence[Body], problems: list[Note]) -> list[Body]:
         kept.append(body)
         by_volume.setdefault(near[1], []).append(body)
     if copies:
-        words = f"{counted(copies, 'solid lies', 'solids lie')} exactly on another one; each is counted once"
+        words = message(
+            "{copies} exactly on another one; each is counted once",
+            copies=counted(copies, "solid lies", "solids lie"),
+        )
         problems.append(Note(GeometryCode.COINCIDENT_SOLIDS, words))
     return kept
 
@@ -513,16 +517,24 @@ def _tell(
     if swallowed:
         volume = sum(body.props.volume_m3 for body in swallowed)
         what = counted(len(swallowed), "solid lies", "solids lie")
-        reasons.append(f"{what} inside of another one ({volume * 1e6:.6g} cm³, not counted)")
+        reasons.append(
+            message(
+                "{what} inside of another one ({volume} cm³, not counted)",
+                what=what,
+                volume=f"{volume * 1000000.0:.6g}",
+            )
+        )
     if crossing:
         volume = sum(props.volume_m3 for props in crossing)
         what = counted(len(crossing), "pair of solids overlaps", "pairs of solids overlap")
-        reasons.append(f"{what} ({volume * 1e6:.6g} cm³, counted once)")
+        reasons.append(
+            message("{what} ({volume} cm³, counted once)", what=what, volume=f"{volume * 1000000.0:.6g}")
+        )
     if unknown:
         what = counted(len(unknown), "pair of solids", "pairs of solids")
-        reasons.append(f"{what} may overlap; this could not be checked")
+        reasons.append(message("{what} may overlap; this could not be checked", what=what))
     if reasons:
-        words = "; ".join(reasons) + ". Is it one part? Its volume is in doubt"
+        words = "; ".join(reasons) + message(". Is it one part? Its volume is in doubt")
         problems.append(Note(GeometryCode.OVERLAPPING_SOLIDS, words))
 
 
@@ -595,7 +607,7 @@ def enclosed(mesh: Mesh, problems: list[Note]) -> SolidProps:
     mesh, repeated = without_doubled(mesh)
     if repeated:
         what = counted(repeated, "of its triangles is", "of its triangles are")
-        words = f"{what} there more than once; each is counted once"
+        words = message("{what} there more than once; each is counted once", what=what)
         problems.append(Note(GeometryCode.COINCIDENT_SOLIDS, words))
     if not len(mesh):
         return NOTHING
@@ -605,14 +617,19 @@ def enclosed(mesh: Mesh, problems: list[Note]) -> SolidProps:
         return mesh_solid(mesh)
     pieces = components(mesh, MAX_COMPONENTS)
     if len(pieces) == 1 and len(components(mesh, sys.maxsize)) > 1:
-        words = (
-            f"its triangles are in more than {MAX_COMPONENTS} pieces, which may overlap; they were added up"
+        words = message(
+            "its triangles are in more than {max_components} pieces, which may overlap; they were added up",
+            max_components=MAX_COMPONENTS,
         )
         problems.append(Note(GeometryCode.OVERLAPPING_SOLIDS, words))
     relations = together([_body(piece) for piece in pieces], MeshCommon(), problems)
     if relations.turned:
-        which = "the mesh is" if len(pieces) == 1 else f"{relations.turned} of its {len(pieces)} pieces are"
-        words = f"{which} inside out; the sign was turned"
+        which = (
+            message("the mesh is")
+            if len(pieces) == 1
+            else message("{turned} of its {count} pieces are", turned=relations.turned, count=len(pieces))
+        )
+        words = message("{which} inside out; the sign was turned", which=which)
         problems.append(Note(GeometryCode.NEGATIVE_VOLUME, words))
     return replace(combined(relations.solids), reversed=relations.turned > 0)
 
@@ -628,7 +645,7 @@ def _not_closed(mesh: Mesh, edges: int) -> Note:
     """
     undirected = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     if (np.unique(undirected, axis=0, return_counts=True)[1] == 2).all():
-        words = "its triangles do not agree on what is outside; its volume cannot be trusted"
+        words = message("its triangles do not agree on what is outside; its volume cannot be trusted")
         return Note(GeometryCode.WINDING, words)
-    words = f"the mesh is open ({edges} free or shared edges), so it has no exact volume"
+    words = message("the mesh is open ({edges} free or shared edges), so it has no exact volume", edges=edges)
     return Note(GeometryCode.NOT_WATERTIGHT, words)

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from silo.bom.errors import ConfigError, SiloError, counted
+from silo.bom.message import message
 from silo.inertia.geometry.cache import provenance
 from silo.inertia.geometry.helpers import helpers_for
 from silo.inertia.geometry.options import ReadOptions
@@ -86,7 +87,11 @@ def with_complaints(reading: GeometryReading, lines: list[str]) -> GeometryReadi
         return reading
     problem = Note(
         GeometryCode.READER,
-        f"the geometry kernel complained {counted(len(lines), 'time')} while reading: {lines[0]}",
+        message(
+            "the geometry kernel complained {lines} while reading: {lines1}",
+            lines=counted(len(lines), "time"),
+            lines1=lines[0],
+        ),
     )
     assembly = replace(reading.assembly, problems=(*reading.assembly.problems, problem))
     return replace(reading, assembly=assembly)

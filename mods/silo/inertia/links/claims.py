@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from silo.bom.errors import ConfigError, InputError
+from silo.bom.message import message
 from silo.inertia.arrays import Floats
 from silo.inertia.assembly import Assembly
 from silo.inertia.links.frames import ASSEMBLY_FRAME, FrameChoice, LinkFrame
@@ -75,7 +76,7 @@ def _by_first_level(assembly: Assembly, root: str) -> Claims:
     for index, instance in enumerate(assembly.instances):
         members.setdefault(instance.path[0] if len(instance.path) > 1 else root, []).append(index)
     frames = {
-        name: LinkFrame(assembly.frames[(name,)], f"sub-assembly “{name}”")
+        name: LinkFrame(assembly.frames[(name,)], message("sub-assembly “{name}”", name=name))
         for name in members
         if (name,) in assembly.frames
     }
@@ -114,15 +115,23 @@ def _map_frames(assembly: Assembly, links: LinkMap) -> dict[str, LinkFrame]:
     problems: list[str] = []
     for link in links.links:
         if link.origin is not None:
-            frames[link.name] = LinkFrame(link.origin, "origin in the link map", chosen=True)
+            frames[link.name] = LinkFrame(link.origin, message("origin in the link map"), chosen=True)
         elif link.frame_of is not None:
             floats = _frame_of(assembly, link.frame_of)
             if floats is None:
-                problems.append(f"{link.name}: there is no placed sub-assembly or part “{link.frame_of}”")
+                problems.append(
+                    message(
+                        "{name}: there is no placed sub-assembly or part “{frame_of}”",
+                        name=link.name,
+                        frame_of=link.frame_of,
+                    )
+                )
             else:
-                frames[link.name] = LinkFrame(floats, f"frame of “{link.frame_of}”", chosen=True)
+                frames[link.name] = LinkFrame(
+                    floats, message("frame of “{frame_of}”", frame_of=link.frame_of), chosen=True
+                )
     if problems:
-        raise ConfigError(f"{links.source}: " + "; ".join(problems))
+        raise ConfigError(message("{source}: ", source=links.source) + "; ".join(problems))
     return frames
 
 
@@ -141,6 +150,10 @@ def chosen_frame(name: str, claims: Claims, choice: FrameChoice) -> LinkFrame:
     turn = frame.placement[:3, :3]
     if not is_rigid(frame.placement) or np.linalg.det(turn) < 0:
         raise InputError(
-            f"link {name}: its frame ({frame.description}) is mirrored or scaled; choose another one"
+            message(
+                "link {name}: its frame ({description}) is mirrored or scaled; choose another one",
+                name=name,
+                description=frame.description,
+            )
         )
     return frame

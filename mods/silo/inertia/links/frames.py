@@ -9,6 +9,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from silo.bom.message import message
 from silo.inertia.arrays import Floats
 
 
@@ -44,7 +45,7 @@ def apart(left: Floats, right: Floats) -> tuple[float, float]:
     return float(np.linalg.norm(left[:3, 3] - right[:3, 3])), float(np.arccos(cosine))
 
 
-ASSEMBLY_FRAME = LinkFrame(np.eye(4), "assembly frame")
+ASSEMBLY_FRAME = LinkFrame(np.eye(4), message("assembly frame"))
 
 
 def origin_frame(xyz: Sequence[float], rpy: Sequence[float]) -> Floats:

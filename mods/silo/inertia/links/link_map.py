@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from silo.bom.errors import ConfigError
+from silo.bom.message import message
 from silo.inertia.arrays import Floats
 from silo.inertia.links.frames import MOST_RAD, origin_frame
 
@@ -52,7 +53,9 @@ def read_link_map(path: Path | str) -> LinkMap:
     try:
         text = Path(path).read_text("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: the link map cannot be read ({error})") from error
+        raise ConfigError(
+            message("{path}: the link map cannot be read ({error})", path=path, error=error)
+        ) from error
     return link_map(_yaml(text, str(path)), str(path))
 
 
@@ -70,16 +73,30 @@ def _yaml(text: str, source: str) -> Any:
         def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
             lines = {k.value: k.start_mark.line + 1 for k, _ in node.value if isinstance(k, yaml.ScalarNode)}
             count = Counter(k.value for k, _ in node.value if isinstance(k, yaml.ScalarNode))
-            twice.extend(f"“{key}” (line {lines[key]})" for key, n in count.items() if n > 1)
+            twice.extend(
+                message("“{key}” (line {key1})", key=key, key1=lines[key])
+                for key, n in count.items()
+                if n > 1
+            )
             return super().construct_mapping(node, deep)
 
     try:
         data = yaml.load(text, Loader)
     except (yaml.YAMLError, RecursionError) as error:
-        raise ConfigError(f"{source}: this is not valid YAML ({' '.join(str(error).split())})") from error
+        raise ConfigError(
+            message(
+                "{source}: this is not valid YAML ({error})",
+                source=source,
+                error=" ".join(str(error).split()),
+            )
+        ) from error
     if twice:
         raise ConfigError(
-            f"{source}: given twice: {', '.join(twice)}; write all parts of a link in one place"
+            message(
+                "{source}: given twice: {twice}; write all parts of a link in one place",
+                source=source,
+                twice=", ".join(twice),
+            )
         )
     return data
 
@@ -98,8 +115,11 @@ def as_link_map(links: LinkMap | Mapping[str, Any] | Path | str | None) -> LinkM
         whole = isinstance(links.get("links"), Mapping) and len(links) == 1
         return link_map({"links": {**(links["links"] if whole else links)}})
     raise ConfigError(
-        "links: wanted a link map, the path of its YAML file, or a dict of link → list of patterns; "
-        f"got {type(links).__name__}"
+        message(
+            "links: wanted a link map, the path of its YAML file, or a dict of link → list "
+            "of patterns; got {name}",
+            name=type(links).__name__,
+        )
     )
 
 
@@ -107,17 +127,19 @@ def link_map(data: Any, source: str = "the link map") -> LinkMap:
     """Do what :func:`read_link_map` does, from plain values."""
     links = data.get("links") if isinstance(data, dict) else None
     if not isinstance(links, dict) or not links:
-        raise ConfigError(f"{source}: wanted “links:” with a list of patterns for each link")
+        raise ConfigError(
+            message("{source}: wanted “links:” with a list of patterns for each link", source=source)
+        )
     problems: list[str] = []
     made = tuple(_link(name, value, problems) for name, value in links.items())
     if problems:
-        raise ConfigError(f"{source}: " + "; ".join(problems))
+        raise ConfigError(message("{source}: ", source=source) + "; ".join(problems))
     return LinkMap(made, source)
 
 
 def _link(name: Any, value: Any, problems: list[str]) -> Link:
     if not isinstance(name, str) or not name:
-        problems.append(f"a link's name is a text, got {name!r}")
+        problems.append(message("a link's name is a text, got {name}", name=repr(name)))
     given: dict[Any, Any] = value if isinstance(value, dict) else {"parts": value}
     parts = given.get("parts", [])
     patterns = [parts] if isinstance(parts, str) else parts
@@ -126,26 +148,42 @@ def _link(name: Any, value: Any, problems: list[str]) -> Link:
         or not patterns
         or not all(p and isinstance(p, str) for p in patterns)
     ):
-        problems.append(f"{name}: wanted a list of patterns, got {parts!r}")
+        problems.append(
+            message("{name}: wanted a list of patterns, got {parts}", name=name, parts=repr(parts))
+        )
         patterns = []
     for key in sorted(set(given) - {"parts", "frame", "origin", "mass"}, key=str):
-        problems.append(f"{name}: unknown key “{key}”; known are parts, frame, origin, mass")
+        problems.append(
+            message("{name}: unknown key “{key}”; known are parts, frame, origin, mass", name=name, key=key)
+        )
     if "frame" in given and "origin" in given:
-        problems.append(f"{name}: has both a frame and an origin; give one of them")
+        problems.append(message("{name}: has both a frame and an origin; give one of them", name=name))
     origin: Floats | None = None
     if "origin" in given:
         try:
             origin = _origin(given["origin"])
         except (AttributeError, TypeError, ValueError) as error:
             problems.append(
-                f"{name}: origin: wanted {{xyz: [x, y, z], rpy: [r, p, y]}} in m and rad ({error})"
+                message(
+                    "{name}: origin: wanted {xyz: [x, y, z], rpy: [r, p, y]} in m and rad ({error})",
+                    name=name,
+                    error=error,
+                )
             )
     frame = given.get("frame")
     if frame is not None and not isinstance(frame, str):
-        problems.append(f"{name}: frame: wanted the name of a part or sub-assembly, got {frame!r}")
+        problems.append(
+            message(
+                "{name}: frame: wanted the name of a part or sub-assembly, got {frame}",
+                name=name,
+                frame=repr(frame),
+            )
+        )
     mass = given.get("mass")
     if mass is not None and not isinstance(mass, str | int | float):
-        problems.append(f"{name}: mass: wanted a mass such as 1.25 kg, got {mass!r}")
+        problems.append(
+            message("{name}: mass: wanted a mass such as 1.25 kg, got {mass}", name=name, mass=repr(mass))
+        )
     weight = None if mass is None else str(mass)
     return Link(str(name), tuple(patterns), None if frame is None else str(frame), origin, weight)
 
@@ -154,7 +192,7 @@ def _origin(value: Mapping[str, Any]) -> Floats:
     xyz = [float(v) for v in value.get("xyz", (0, 0, 0))]
     rpy = [float(v) for v in value.get("rpy", (0, 0, 0))]
     if len(xyz) != 3 or len(rpy) != 3 or not np.isfinite([*xyz, *rpy]).all():
-        raise ValueError("three numbers each")
+        raise ValueError(message("three numbers each"))
     if max(map(abs, rpy)) > MOST_RAD:
-        raise ValueError("rpy turns by more than a whole turn; is it in degrees?")
+        raise ValueError(message("rpy turns by more than a whole turn; is it in degrees?"))
     return origin_frame(xyz, rpy)

@@ -16,6 +16,7 @@ from pathlib import PurePosixPath
 import numpy as np
 
 from silo.bom.errors import counted, listed
+from silo.bom.message import message
 from silo.inertia.arrays import Floats
 from silo.inertia.assembly import Assembly, Instance, placed_below
 from silo.inertia.links.claims import ROOT_LINK, claim
@@ -55,7 +56,7 @@ def starting_map(
     if urdf_links:
         return _by_urdf(assembly, urdf_links, root)
     if clusters is None and any(len(instance.path) > 1 for instance in assembly.instances):
-        how = f"each first-level sub-assembly is a link; parts beside them are in {root}"
+        how = message("each first-level sub-assembly is a link; parts beside them are in {root}", root=root)
         return StartingMap(claim(assembly, root=root).members, how)
     return _by_position(assembly, clusters)
 
@@ -72,9 +73,11 @@ def _by_urdf(assembly: Assembly, urdf_links: Mapping[str, Sequence[str]], root: 
         owner = _owner(instance, owner_of)
         named += owner is not None
         members[owner or root].append(index)
-    how = f"{named} of {counted(len(assembly.instances), 'part')} by names of the URDF's links and meshes" + (
-        f"; the others are in {root}" if named < len(assembly.instances) else ""
-    )
+    how = message(
+        "{named} of {instances} by names of the URDF's links and meshes",
+        named=named,
+        instances=counted(len(assembly.instances), "part"),
+    ) + (message("; the others are in {root}", root=root) if named < len(assembly.instances) else "")
     empty = tuple(name for name, ids in members.items() if not ids)
     return StartingMap({name: tuple(ids) for name, ids in members.items() if ids}, how, empty)
 
@@ -120,11 +123,17 @@ def _by_position(assembly: Assembly, clusters: int | None) -> StartingMap:
     )
     names = {number: f"link_{place}" for place, number in enumerate(order, start=1)}
     members = {names[n]: tuple(np.flatnonzero(labels == n).tolist()) for n in order}
-    why = f"--clusters {clusters}" if clusters else "the file has no sub-assemblies"
-    how = f"{why}, so parts that lie together are together; a guess by position alone"
+    why = (
+        message("--clusters {clusters}", clusters=clusters)
+        if clusters
+        else message("the file has no sub-assemblies")
+    )
+    how = message("{why}, so parts that lie together are together; a guess by position alone", why=why)
     if len(members) < 2:
         members = {assembly.name or ROOT_LINK: tuple(range(len(points)))} if len(points) else {}
-        how = "the file has no sub-assemblies, and its parts lie together; --clusters N makes N links"
+        how = message(
+            "the file has no sub-assemblies, and its parts lie together; --clusters N makes N links"
+        )
     return StartingMap(members, how)
 
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from silo.bom.message import message
 from silo.freecads.places import material_folders
 from silo.inertia.materials.densities import parse_density
 from silo.inertia.materials.material import Material
@@ -92,7 +93,7 @@ def materials_of(cards: Iterable[Card]) -> list[Material]:
             stem = card.path.stem
             title = card.name or stem
             aliases = {stem, stem.removesuffix("-Generic"), title.removesuffix(" Generic")} - {title}
-            source = f"FreeCAD card {card.path.name}"
+            source = message("FreeCAD card {name}", name=card.path.name)
             materials.setdefault(title, Material(title, card.density, tuple(sorted(aliases)), source))
     return list(materials.values())
 

@@ -8,6 +8,7 @@ import re
 from typing import NamedTuple
 
 from silo.bom.errors import InputError
+from silo.bom.message import message
 from silo.bom.numbers import LONGEST, parse_number, plain_text, read_number
 from silo.bom.quantities import plain
 from silo.inertia.bom.mass_cell import MASS_UNITS
@@ -44,9 +45,19 @@ def checked_density(value: float) -> float:
     """Check a density [kg/m^3] that a caller gives as a number. InputError if no solid has it."""
     if UNIT_NEEDED_BELOW <= value <= DENSEST:
         return value
-    hint = f"; {value:g} g/cm³ are {value * 1000:g} kg/m³" if 0.01 < value < UNIT_NEEDED_BELOW else ""
+    hint = (
+        message("; {value} g/cm³ are {value1} kg/m³", value=f"{value:g}", value1=f"{value * 1000:g}")
+        if 0.01 < value < UNIT_NEEDED_BELOW
+        else ""
+    )
     raise InputError(
-        f"wanted a default density from {UNIT_NEEDED_BELOW:g} to {DENSEST:g} kg/m³, got {value:g}{hint}"
+        message(
+            "wanted a default density from {unit_needed_below} to {densest} kg/m³, got {value}{hint}",
+            unit_needed_below=f"{UNIT_NEEDED_BELOW:g}",
+            densest=f"{DENSEST:g}",
+            value=f"{value:g}",
+            hint=hint,
+        )
     )
 
 
@@ -67,7 +78,12 @@ def read_density(text: str, factor: float = 1.0, *, points_are_decimal: bool = F
     if match is not None:
         own = _factor_of(match)
         if own is None:
-            return DensityCell(None, f"wanted a unit such as kg/m3 or g/cm3, got “{text.strip()[:LONGEST]}”")
+            return DensityCell(
+                None,
+                message(
+                    "wanted a unit such as kg/m3 or g/cm3, got “{longest}”", longest=text.strip()[:LONGEST]
+                ),
+            )
         factor, cell = own, match["number"].strip()
     has_unit = match is not None
     number = parse_number(cell)
@@ -80,9 +96,13 @@ def read_density(text: str, factor: float = 1.0, *, points_are_decimal: bool = F
         value = float(reading.value)
     value *= factor
     if not LIGHTEST <= value <= DENSEST:
-        than = "lighter than any solid" if value < LIGHTEST else "denser than any metal"
-        shown = f"{plain(value):.6g} kg/m³" if math.isfinite(value) else "that"
-        return DensityCell(None, f"{shown} is {than}; is the unit or the decimal mark wrong?", has_unit)
+        than = message("lighter than any solid") if value < LIGHTEST else message("denser than any metal")
+        shown = message("{value} kg/m³", value=f"{plain(value):.6g}") if math.isfinite(value) else "that"
+        return DensityCell(
+            None,
+            message("{shown} is {than}; is the unit or the decimal mark wrong?", shown=shown, than=than),
+            has_unit,
+        )
     return DensityCell(value, "", has_unit)
 
 

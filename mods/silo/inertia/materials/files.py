@@ -15,6 +15,7 @@ from types import MappingProxyType
 from typing import Any
 
 from silo.bom.errors import ConfigError
+from silo.bom.message import message
 from silo.bom.numbers import parse_number
 from silo.inertia.materials.densities import UNIT_NEEDED_BELOW, density_factor, read_density
 from silo.inertia.materials.material import Material
@@ -50,12 +51,14 @@ def user_rows(path: Path | str) -> tuple[Material, ...]:
     try:
         text = path.read_text("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: the material table cannot be read ({error})") from error
+        raise ConfigError(
+            message("{path}: the material table cannot be read ({error})", path=path, error=error)
+        ) from error
     if path.suffix.lower() == ".csv":
         return _csv_rows(text, str(path))
     if path.suffix.lower() == ".toml":
         return _checked(_toml_records(text, str(path)), None, str(path))
-    raise ConfigError(f"{path}: a material table is a .csv or .toml file")
+    raise ConfigError(message("{path}: a material table is a .csv or .toml file", path=path))
 
 
 _Record = tuple[str, Mapping[str, Any]]
@@ -69,14 +72,29 @@ def _csv_rows(text: str, source: str) -> tuple[Material, ...]:
     for head in sorted(filter(None, reader.fieldnames or ()), key=len):  # "name" goes before "name_de"
         heads.setdefault(re.sub(r"[\W_].*", "", head.strip()).casefold(), head)
     if not {"name", "density"} <= heads.keys():
-        raise ConfigError(f"{source}: wanted columns “name” and “density”, got {reader.fieldnames}")
+        raise ConfigError(
+            message(
+                "{source}: wanted columns “name” and “density”, got {fieldnames}",
+                source=source,
+                fieldnames=reader.fieldnames,
+            )
+        )
     # "density (g/cm3)", "Density [g/cm3]", "density_g/cm3": everything after the word is the unit.
     unit = heads["density"].strip()[len("density") :].strip(" _:,-()[]")
     factor = density_factor(unit) if unit else None
     if unit and factor is None:
-        raise ConfigError(f"{source}: unknown density unit in the header “{heads['density']}”")
+        raise ConfigError(
+            message(
+                "{source}: unknown density unit in the header “{heads}”",
+                source=source,
+                heads=heads["density"],
+            )
+        )
     records = (
-        (f"line {reader.line_num}", {key: record.get(head) or "" for key, head in heads.items()})
+        (
+            message("line {line_num}", line_num=reader.line_num),
+            {key: record.get(head) or "" for key, head in heads.items()},
+        )
         for record in reader
     )
     return _checked(records, factor, source)
@@ -86,9 +104,11 @@ def _toml_records(text: str, source: str) -> Iterator[_Record]:
     try:
         table = tomllib.loads(text).get("materials", {})
     except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"{source}: this is not valid TOML ({error})") from error
+        raise ConfigError(
+            message("{source}: this is not valid TOML ({error})", source=source, error=error)
+        ) from error
     if not isinstance(table, dict) or not table:
-        raise ConfigError(f"{source}: wanted a table [materials] with name = density")
+        raise ConfigError(message("{source}: wanted a table [materials] with name = density", source=source))
     for name, value in table.items():
         given = value if isinstance(value, dict) else {"density": value}
         yield f"materials.{name}", {**given, "name": name}
@@ -101,7 +121,7 @@ def _checked(records: Iterable[_Record], factor: float | None, source: str) -> t
     for where, cells in records:
         row = _material(cells, factor, source)
         if isinstance(row, str):
-            problems.append(f"{where}: {row}")
+            problems.append(message("{where}: {row}", where=where, row=row))
         else:
             rows.append(row)
     seen: dict[Words, Material] = {}
@@ -109,9 +129,16 @@ def _checked(records: Iterable[_Record], factor: float | None, source: str) -> t
         for alias in (row.name, *row.aliases):
             other = seen.setdefault(words(alias), row)
             if other is not row and other.density != row.density:
-                problems.append(f"“{alias}” has two densities, {other.density:g} and {row.density:g} kg/m³")
+                problems.append(
+                    message(
+                        "“{alias}” has two densities, {density} and {density2} kg/m³",
+                        alias=alias,
+                        density=f"{other.density:g}",
+                        density2=f"{row.density:g}",
+                    )
+                )
     if problems:
-        raise ConfigError(f"{source}: " + "; ".join(problems))
+        raise ConfigError(message("{source}: ", source=source) + "; ".join(problems))
     return tuple(rows)
 
 
@@ -119,21 +146,27 @@ def _material(cells: Mapping[str, Any], factor: float | None, source: str) -> Ma
     """Read a row, or say what is wrong with it."""
     name, density, spread = (str(cells.get(key, "")).strip() for key in ("name", "density", "spread"))
     if not name:
-        return f"wanted a name, got none for the density “{density}”"
+        return message("wanted a name, got none for the density “{density}”", density=density)
     cell = read_density(density, factor or 1.0)
     if not cell.has_unit and factor is None and _is_below(density, UNIT_NEEDED_BELOW):
-        return (
-            f"“{name}” has the density {density} without a unit; as kg/m³ it would be lighter than a foam. "
-            f"Write “{density} g/cm3” or “{density} kg/m3”"
+        return message(
+            "“{name}” has the density {density} without a unit; as kg/m³ it would be lighter "
+            "than a foam. Write “{density} g/cm3” or “{density} kg/m3”",
+            name=name,
+            density=density,
         )
     if cell.value is None:
-        return f"the density of “{name}”: {cell.problem}"
+        return message("the density of “{name}”: {problem}", name=name, problem=cell.problem)
     percent = parse_number(spread.removesuffix("%") or "0")
     if percent is None or not 0 <= percent.value < 100:
-        return f"the spread of “{name}”: wanted 0 to 100 percent, got “{spread}”"
+        return message(
+            "the spread of “{name}”: wanted 0 to 100 percent, got “{spread}”", name=name, spread=spread
+        )
     given = cells.get("aliases", "")
     if not isinstance(given, str | list):
-        return f"the aliases of “{name}”: wanted a list of names, got “{given}”"
+        return message(
+            "the aliases of “{name}”: wanted a list of names, got “{given}”", name=name, given=given
+        )
     aliases = given.split(";") if isinstance(given, str) else map(str, given)
     return Material(
         name,

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from silo.bom.message import message
+
 
 @dataclass(frozen=True)
 class Material:
@@ -48,4 +50,9 @@ class MaterialMiss:
         """Return the reason, with the nearest material if there is one."""
         if self.nearest is None:
             return self.reason
-        return f"{self.reason} (the nearest is {self.nearest.name}, {self.nearest.density:g} kg/m³)"
+        return message(
+            "{reason} (the nearest is {name}, {density} kg/m³)",
+            reason=self.reason,
+            name=self.nearest.name,
+            density=f"{self.nearest.density:g}",
+        )

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
+from silo.bom.message import message
 from silo.inertia.materials.cards import installed_cards
 from silo.inertia.materials.files import package_rows, user_rows
 from silo.inertia.materials.material import Material, MaterialHit, MaterialMiss
@@ -45,7 +46,7 @@ class MaterialTable:
     def _look_up(self, text: str) -> MaterialHit | MaterialMiss:
         tokens = words(text)
         if not tokens:
-            return MaterialMiss("it names nothing")
+            return MaterialMiss(message("it names nothing"))
         answer = self._index.find(tokens)
         if isinstance(answer, MaterialHit) and not answer.doubt:
             return answer
@@ -54,9 +55,13 @@ class MaterialTable:
             return answer
         if isinstance(answer, MaterialMiss) or card.density == answer.material.density:
             return MaterialHit(card)
-        doubt = (
-            f"{answer.doubt}; a FreeCAD card on this machine has that name, and its {card.density:g} kg/m³ "
-            f"were used instead of the {answer.material.density:g} kg/m³ of {answer.material.name}"
+        doubt = message(
+            "{doubt}; a FreeCAD card on this machine has that name, and its {density} kg/m³ "
+            "were used instead of the {density2} kg/m³ of {name}",
+            doubt=answer.doubt,
+            density=f"{card.density:g}",
+            density2=f"{answer.material.density:g}",
+            name=answer.material.name,
         )
         return MaterialHit(card, doubt)
 
@@ -104,14 +109,21 @@ class _Index:
         rest = tuple(word for index, word in enumerate(text) if index not in covered)
         turn = next((w for w in rest if w in MEANING["compound"] or COMPOUND_SHAPES.fullmatch(w)), None)
         if turn is not None:
-            return MaterialMiss(f"“{turn}” makes it something else than {left[0].name}", left[0])
+            return MaterialMiss(
+                message("“{turn}” makes it something else than {name}", turn=turn, name=left[0].name), left[0]
+            )
         if len({row.density for row in left}) > 1:
-            return MaterialMiss("it names more than one material: " + " and ".join(row.name for row in left))
+            return MaterialMiss(
+                message("it names more than one material: ") + " and ".join(row.name for row in left)
+            )
         start, end = next((start, end) for start, end, row in hits if row is left[0])
         doubt = contradiction(left[0].name, text[start:end], left[0].density, tokens, rest)
         strange = not_understood(rest)
         if strange and not doubt:
-            doubt = f"“{' '.join(strange)}” in it is not understood, and may make it another material"
+            doubt = message(
+                "“{strange}” in it is not understood, and may make it another material",
+                strange=" ".join(strange),
+            )
         return MaterialHit(left[0], doubt)
 
     def _hits(self, text: Words) -> list[tuple[int, int, Material]]:
@@ -130,9 +142,9 @@ class _Index:
     def _nothing(self, tokens: Words, text: Words) -> MaterialMiss:
         if text != tokens and not not_understood(text):
             # Most parts of which only the plating is known are of steel.
-            reason = "it names what lies on the part, and not what the part is made of"
+            reason = message("it names what lies on the part, and not what the part is made of")
             return MaterialMiss(reason, self.exact.get(("steel",)))
-        return MaterialMiss("it is in no table", self._alike(tokens))
+        return MaterialMiss(message("it is in no table"), self._alike(tokens))
 
     def _alike(self, tokens: Words) -> Material | None:
         """Find the row with the most similar spelling and the same digits, since 6063 is another alloy than

@@ -17,6 +17,7 @@ import tomllib
 from collections.abc import Set
 from importlib.resources import files
 
+from silo.bom.message import message
 from silo.bom.numbers import plain_text
 
 Words = tuple[str, ...]
@@ -40,7 +41,7 @@ _FINISHES = (("black", "oxide"), ("oxide", "finish"), ("hot", "dip"), ("hot", "d
 def words(text: str) -> Words:
     """Split a material's name into words of plain characters, case-folded; a percent sign is a word."""
     # The only symbol that is another material without its capitals.
-    return tuple(_WORD.findall(plain_text(re.sub(r"\bTiN\b", "titanium nitride", text)).casefold()))
+    return tuple(_WORD.findall(plain_text(re.sub(r"\bTiN\b", message("titanium nitride"), text)).casefold()))
 
 
 def without_platings(text: Words, covered: Set[str]) -> Words:
@@ -95,13 +96,15 @@ def contradiction(name: str, hit: Words, density: float, text: Words, rest: Word
     words_around = set(rest)
     for kind, wrong in ((MEANING["plastic"], density > 2300), (MEANING["metal"], density < 1700)):
         if wrong and kind & words_around:
-            return f"“{min(kind & words_around)}” in it does not fit {name}"
+            return message(
+                "“{words_around}” in it does not fit {name}", words_around=min(kind & words_around), name=name
+            )
     if (
         len(hit) == 1
         and hit[0] in MEANING["colour metal"]
         and (MEANING["hue"] & words_around or MEANING["dyed"] & set(text))
     ):
-        return f"“{hit[0]}” in it may be a colour"
+        return message("“{hit}” in it may be a colour", hit=hit[0])
     if name in MEANING["pure"] and rest:
-        return f"“{' '.join(rest)}” in it may be an alloy or another purity"
+        return message("“{rest}” in it may be an alloy or another purity", rest=" ".join(rest))
     return ""

@@ -12,6 +12,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from silo.bom.errors import InputError
+from silo.bom.message import message
 from silo.inertia.arrays import Floats
 from silo.inertia.digits import number
 from silo.inertia.report import LinkResult
@@ -69,5 +70,7 @@ def writable(links: Iterable[LinkResult]) -> dict[str, MassProps]:
             bad.append(f"{link.name} {tensor_words(problems)}")
         fit[link.name] = props
     if bad:
-        raise InputError("not written, because no rigid body can have these inertias: " + "; ".join(bad))
+        raise InputError(
+            message("not written, because no rigid body can have these inertias: ") + "; ".join(bad)
+        )
     return fit

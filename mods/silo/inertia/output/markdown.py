@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable, Sequence
 
 from silo.bom.errors import listed
+from silo.bom.message import message
 from silo.inertia.output.words import (
     MAX_PLACES,
     PART_HEADINGS,
@@ -23,15 +24,27 @@ from silo.inertia.report import InertiaReport
 
 def report_markdown(report: InertiaReport) -> str:
     """Write the report as Markdown."""
-    out = [f"# Mass properties of {_cell(report.assembly or 'the assembly')}", ""]
-    out += [f"Geometry: {_cell(report.source)}  ", f"BOM: {_cell(report.bom) or 'none'}", ""]
+    out = [
+        message(
+            "# Mass properties of {assembly}", assembly=_cell(report.assembly or message("the assembly"))
+        ),
+        "",
+    ]
+    out += [
+        message("Geometry: {source}  ", source=_cell(report.source)),
+        message("BOM: {bom}", bom=_cell(report.bom) or "none"),
+        "",
+    ]
     if report.reconciliation is not None:
         out += [_cell(report.reconciliation.sentence), ""]
     out += ["## Links", "", *_link_rows(report), "", *_frames(report), ""]
     out += ["## Parts", "", *_part_rows(report), ""]
     if report.unclaimed:
         out += [
-            f"Parts without a link sum up to {short(loose(report))} kg; they are in no link's mass.",
+            message(
+                "Parts without a link sum up to {report} kg; they are in no link's mass.",
+                report=short(loose(report)),
+            ),
             "",
         ]
     out += ["## Warnings", ""]
@@ -46,16 +59,23 @@ def _link_rows(report: InertiaReport) -> Iterable[str]:
         yield _row(link_cells(link))
     if report.total is not None:
         total = report.total
-        yield f"| **whole assembly** | **{short(total.mass)}** | {vector(total.com, 1.0)} | | | |"
+        yield message(
+            "| **whole assembly** | **{mass}** | {com} | | | |",
+            mass=short(total.mass),
+            com=vector(total.com, 1.0),
+        )
 
 
 def _frames(report: InertiaReport) -> Iterable[str]:
     frames = {link.frame.description for link in report.links.values()}
     if len(frames) == 1:
         frame = _cell(frames.pop())
-        yield f"Inertia is about each centre of mass. Frame: {frame}; of the whole assembly: its own."
+        yield message(
+            "Inertia is about each centre of mass. Frame: {frame}; of the whole assembly: its own.",
+            frame=frame,
+        )
         return
-    yield "Inertia is about each centre of mass. Frames:"
+    yield message("Inertia is about each centre of mass. Frames:")
     yield ""
     for link in report.links.values():
         yield f"- {_cell(link.name)}: {_cell(link.frame.description)}"

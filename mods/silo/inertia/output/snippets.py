@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from xml.sax.saxutils import quoteattr
 
 from silo.bom.errors import InputError
+from silo.bom.message import message
 from silo.inertia.digits import number
 from silo.inertia.rigid import MassProps
 
@@ -87,12 +88,19 @@ def document(links: Mapping[str, MassProps], kind: str, name: str) -> str:
     unwritable = [ascii(link) for link in links if not _XML.fullmatch(link)]
     if unwritable:
         raise InputError(
-            f"XML cannot hold the characters of the link {', '.join(unwritable)}; a link map can rename it"
+            message(
+                "XML cannot hold the characters of the link {unwritable}; a link map can rename it",
+                unwritable=", ".join(unwritable),
+            )
         )
     bad = [link for link in links if link in taken or (kind == "sdf" and ("::" in link or _is_dunder(link)))]
     if bad:
         raise InputError(
-            f"{kind.upper()} does not allow a link with the name {', '.join(bad)}; a link map can rename it"
+            message(
+                "{kind} does not allow a link with the name {bad}; a link map can rename it",
+                kind=kind.upper(),
+                bad=", ".join(bad),
+            )
         )
     title = "".join(c if _XML.fullmatch(c) else " " for c in name)
     title = title.replace("::", " ") if kind == "sdf" else title

@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from silo.bom.errors import counted, listed
+from silo.bom.message import message
 from silo.inertia.output.words import (
     MAX_PLACES,
     PART_HEADINGS,
@@ -49,19 +50,21 @@ def _table(title: str, headings: Iterable[str], say: Say) -> Table:
 def _links_table(report: InertiaReport, say: Say, *, whole: bool) -> Table:
     tensor = ">Ixx Iyy Izz / Ixy Ixz Iyz  kg m²"
     headings = ("Link", ">Mass kg", ">Centre of mass m", tensor, ">Parts", ">Warnings")
-    table = _table(f"{report.assembly or 'assembly'}: mass properties", headings, say)
+    table = _table(
+        message("{assembly}: mass properties", assembly=report.assembly or "assembly"), headings, say
+    )
     for link in report.links.values():
         name, mass, com, moments, products, parts = link_cells(link)
         warnings = str(sum(w.link_name == link.name for w in report.warnings))
-        tensor = f"{moments}{' / ' if whole else chr(10)}{products}"
-        table.add_row(*map(_plain, (name, mass, com, tensor, parts, warnings)))
+        inertia = f"{moments}{' / ' if whole else chr(10)}{products}"
+        table.add_row(*map(_plain, (name, mass, com, inertia, parts, warnings)))
     if report.total is not None and not _is_one_body(report):
         table.add_section()
-        cells = (
-            say("whole assembly"),
+        cells: tuple[str, ...] = (
+            say(message("whole assembly")),
             short(report.total.mass),
             vector(report.total.com, 1.0),
-            say(f"in no link: {short(loose(report))} kg") if report.unclaimed else "",
+            say(message("in no link: {report} kg", report=short(loose(report)))) if report.unclaimed else "",
             str(sum(part.quantity for _, part in report.parts())),
             str(len(report.warnings)),
         )
@@ -71,7 +74,7 @@ def _links_table(report: InertiaReport, say: Say, *, whole: bool) -> Table:
 
 def _parts_table(report: InertiaReport, say: Say, *, whole: bool) -> RenderableType:
     skip = int(_is_one_body(report))  # the link's name
-    table = _table("Parts and where their masses come from", PART_HEADINGS[skip:], say)
+    table = _table(message("Parts and where their masses come from"), PART_HEADINGS[skip:], say)
     rows = report.parts()
     most = len(rows) if whole else MAX_PART_ROWS
     for link, part in rows[:most]:
@@ -79,7 +82,9 @@ def _parts_table(report: InertiaReport, say: Say, *, whole: bool) -> RenderableT
             *map(_plain, part_cells(link, part, say)[skip:]), style="yellow" if part.warnings else ""
         )
     if len(rows) > most:
-        table.caption = say(f"… and {len(rows) - most} more; --report parts.csv has them all")
+        table.caption = say(
+            message("… and {count} more; --report parts.csv has them all", count=len(rows) - most)
+        )
     return table
 
 
@@ -93,17 +98,23 @@ def report_warnings(report: InertiaReport, *, whole: bool = False, say: Say = st
     ``whole``: with all places; ``say`` says them in the language of a user.
     """
     if not report.warnings:
-        return Text(say("No warnings."), style="green")
-    text = Text(f"{say(counted(len(report.warnings), 'warning'))}\n", style="yellow")
+        return Text(say(message("No warnings.")), style="green")
+    text = Text(
+        message("{warnings}\n", warnings=say(counted(len(report.warnings), "warning"))), style="yellow"
+    )
     for cause in report.causes():
         groups = grouped(cause.warnings, with_links=not _is_one_body(report))
         where = list(dict.fromkeys(place for places in groups.values() for place in places))
-        mass = f"{short(cause.mass)} kg in " if cause.mass > 0 else ""
+        mass = message("{mass} kg in ", mass=short(cause.mass)) if cause.mass > 0 else ""
         places = ", ".join(where) if whole else listed(where, MAX_PLACES)
-        text.append(f"  {mass}{places}: " if where else "  ", style="bold")
+        text.append(message("  {mass}{places}: ", mass=mass, places=places) if where else "  ", style="bold")
         text.append(clean(say(next(iter(groups))[0])))
-        more = f"; {len(groups) - 1} more like it, each in --json and in a report" if len(groups) > 1 else ""
-        text.append(f"{say(more)}  [{cause.code}]\n", style="dim")
+        more = (
+            message("; {count} more like it, each in --json and in a report", count=len(groups) - 1)
+            if len(groups) > 1
+            else ""
+        )
+        text.append(message("{more}  [{code}]\n", more=say(more), code=cause.code), style="dim")
     return text
 
 

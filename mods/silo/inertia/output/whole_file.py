@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 
 from silo.bom.errors import InputError
+from silo.bom.message import message
 from silo.platform.whole_files import replacing
 
 
@@ -25,7 +26,9 @@ def write_whole(path: Path | str, data: bytes, *, like: Path | str | None = None
         with replacing(target, mode=_mode(target if like is None else Path(like))) as file:
             file.write(data)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
+        raise InputError(
+            message("{path}: cannot be written ({error})", path=path, error=error.strerror or error)
+        ) from error
 
 
 def _mode(path: Path) -> int:

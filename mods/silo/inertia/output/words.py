@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable
 
+from silo.bom.message import message
 from silo.inertia.codes import Decided, Source
 from silo.inertia.report import InertiaReport, LinkResult, PartResult, PartWarning
 
@@ -19,12 +20,12 @@ MAX_PLACES = 6
 """Links and parts that one warning names in a terminal and in Markdown; a pipe has all of them."""
 
 SOURCE_WORDS = {
-    Source.BOM_MASS: "BOM mass",
-    Source.MATERIAL: "material × volume",
-    Source.TARGET_MASS: "share of what was weighed",
-    Source.SUB_ASSEMBLY_MASS: "share of the sub-assembly's BOM mass",
-    Source.STEP_DENSITY: "density in the file × volume",
-    Source.DEFAULT_DENSITY: "default density × volume",
+    Source.BOM_MASS: message("BOM mass"),
+    Source.MATERIAL: message("material × volume"),
+    Source.TARGET_MASS: message("share of what was weighed"),
+    Source.SUB_ASSEMBLY_MASS: message("share of the sub-assembly's BOM mass"),
+    Source.STEP_DENSITY: message("density in the file × volume"),
+    Source.DEFAULT_DENSITY: message("default density × volume"),
     Source.ZERO: "zero",
 }
 
@@ -32,7 +33,11 @@ SOURCE_WORDS = {
 def how(part: PartResult) -> str:
     """Say how a part found its row: "normalised, by quantity"."""
     words = part.rule.replace("_", " ")
-    return words if part.decided_by in (Decided.ONLY, Decided.SAME_DATA) else f"{words}, by {part.decided_by}"
+    return (
+        words
+        if part.decided_by in (Decided.ONLY, Decided.SAME_DATA)
+        else message("{words}, by {decided_by}", words=words, decided_by=part.decided_by)
+    )
 
 
 def material_of(part: PartResult) -> str:
@@ -62,12 +67,21 @@ def loose(report: InertiaReport) -> float:
     return sum(part.total_mass for part in report.unclaimed)
 
 
-PART_HEADINGS = ("Link", "Part", ">Qty", ">Volume cm³", ">Mass kg", "Source", "Matched", "Material")
+PART_HEADINGS = (
+    "Link",
+    "Part",
+    ">Qty",
+    ">Volume cm³",
+    ">Mass kg",
+    "Source",
+    "Matched",
+    "Material",
+)
 
 
 def part_cells(link: str, part: PartResult, say: Say = str) -> tuple[str, ...]:
     return (
-        link or say("(no link)"),
+        link or say(message("(no link)")),
         part.name,
         str(part.quantity),
         f"{part.volume * 1e6:.5g}",

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
+from silo.bom.message import message
 from silo.platform.spelling import one_path
 from silo.workbench.desk import MOST_S, Documents
 from silo.workbench.documents.order import leaves_first
@@ -165,7 +166,7 @@ def refusal(plan: CommitPlan) -> str:
     name = plain(os.path.basename(top.path) or top.label, 80)
     if top.state is DocumentState.UNNAMED:
         return translate("Silo", "{name} has no file yet. Save it under a name first.", name=name)
-    return f"{name}: {top.note}"
+    return message("{name}: {note}", name=name, note=top.note)
 
 
 def _state(doc: Any, documents: Documents, until: float) -> DocumentState:

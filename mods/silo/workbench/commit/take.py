@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from silo.bom.errors import DocumentError, SiloError
+from silo.bom.message import message
 from silo.outbox.entry import new_key
 from silo.platform.spelling import one_path
 from silo.platform.stamp import Stamp, stamp_of
@@ -66,7 +67,10 @@ def take_each(
             taken = CommittedDocument(row, error=SiloError(text))
         except Exception as error:  # noqa: BLE001  # one document's trouble is not that of the others
             taken = CommittedDocument(
-                row, error=SiloError(f"unexpected problem ({type(error).__name__}: {error})")
+                row,
+                error=SiloError(
+                    message("unexpected problem ({name}: {error})", name=type(error).__name__, error=error)
+                ),
             )
         yield taken
 
@@ -76,14 +80,16 @@ def _take(
 ) -> CommittedDocument:
     base = documents.base(row.document)
     if one_path(row.document.FileName) != row.path:
-        text = "it was saved under another name since this commit was asked for; commit it again"
+        text = message("it was saved under another name since this commit was asked for; commit it again")
         raise DocumentError(row.path, text)
     # What somebody else has written is no file of ours: ours is written again, at a user's word. What
     # was edited while documents before it were saved goes along: the BOM is that of the file.
     if row.state is not DocumentState.SAVED or base.replaced or is_edited(documents, row.document):
         if base.replaced and not row.replaced:
-            text = "somebody has written it since this commit was asked for; nothing was saved over it. "
-            raise DocumentError(row.path, text + "Commit it again, and choose which one counts")
+            text = message(
+                "somebody has written it since this commit was asked for; nothing was saved over it. "
+            )
+            raise DocumentError(row.path, text + message("Commit it again, and choose which one counts"))
         if base.replaced:
             outbox.keep_aside(row.path)
         documents.save(row.document)

@@ -6,13 +6,16 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING
 
+from silo.bom.message import message
+
 if TYPE_CHECKING:
     from silo.fcstd.errors import FcstdError
 
 
-DAMAGED = (
-    "FreeCAD opens what it can of a damaged file, and saving that would make the loss final: fetch the file "
-    "again, or check that nothing is missing and save it in FreeCAD yourself"
+DAMAGED = message(
+    "FreeCAD opens what it can of a damaged file, and saving that would make the "
+    "loss final: fetch the file again, or check that nothing is missing and save it "
+    "in FreeCAD yourself"
 )
 
 # File and object → the file's state when all that the object needs could be read.

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.errors import DocumentError
+from silo.bom.message import message
 from silo.freecads.places import start
 from silo.workbench.freecad import host
 
@@ -74,9 +75,11 @@ class FreeCadDrawer:
                 Segments=True,
             )
         except Exception as error:
-            raise DocumentError(named, f"holds no shape that FreeCAD can draw: {error}") from error
+            raise DocumentError(
+                named, message("holds no shape that FreeCAD can draw: {error}", error=error)
+            ) from error
         if made.countSegments() != len(shape.Faces):
-            raise DocumentError(named, "FreeCAD drew a different number of faces than the shape has")
+            raise DocumentError(named, message("FreeCAD drew a different number of faces than the shape has"))
         points, rows = made.Topology
         vertices = MM * np.array([tuple(point) for point in points]).reshape(-1, 3)
         faces = np.array(rows, dtype=np.int64).reshape(-1, 3)
@@ -134,7 +137,9 @@ def _stored(path: Path, named: str, place: Floats) -> Any:
     from silo.inertia.placements import is_rigid
 
     if not is_rigid(place):
-        raise DocumentError(named, "its placement scales it inside of its part, which is not supported")
+        raise DocumentError(
+            named, message("its placement scales it inside of its part, which is not supported")
+        )
     shape = Part.Shape()
     read = shape.importBinary if is_binary_brep(path) else shape.importBrep
     try:
@@ -142,5 +147,7 @@ def _stored(path: Path, named: str, place: Floats) -> Any:
         placement = type(shape.Placement)
         shape.Placement = placement(type(shape.Placement.toMatrix())(*place.ravel().tolist()))
     except Exception as error:
-        raise DocumentError(named, f"holds no shape that FreeCAD can draw: {error}") from error
+        raise DocumentError(
+            named, message("holds no shape that FreeCAD can draw: {error}", error=error)
+        ) from error
     return shape

@@ -13,6 +13,8 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
+from silo.bom.message import message
+
 # Two points are the same if they are within FreeCAD's own tolerance, relative to the shape.
 SAME = 1e-7
 
@@ -135,12 +137,12 @@ class EditWatch:
         """Yield the differences that were found, such as "Pad.Length"."""
         edits = self._docs.get(doc.Name)
         if edits is None:
-            yield "it had edits before anybody looked"
+            yield message("it had edits before anybody looked")
             return
         yield from edits.made | edits.gone
         for (obj, name), old in edits.before.items():
             if until is not None and time.thread_time() > until:
-                yield "there was no time to compare the rest"
+                yield message("there was no time to compare the rest")
                 return
             owner = doc.getObject(obj) if obj else doc
             if owner is not None and _differs(owner, name, old):

@@ -17,6 +17,7 @@ from typing import Any
 
 import FreeCAD
 
+from silo.bom import message as sentences
 from silo.workbench.words import visible
 
 # --- FreeCAD itself --------------------------------------------------------------------------------------
@@ -49,7 +50,7 @@ def program() -> str:
     for path in (os.path.join(folder, name) for folder in folders for name in names):
         if "freecadcmd" in os.path.basename(path).lower() and os.path.isfile(path):
             return path
-    raise ConfigError("FreeCAD does not say which program runs it")
+    raise ConfigError(sentences.message("FreeCAD does not say which program runs it"))
 
 
 def user_data_folder() -> str:

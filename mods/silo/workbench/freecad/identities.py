@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+from silo.bom.message import message
 from silo.workbench.freecad.modified import others_unmarked
 
 
@@ -26,7 +27,7 @@ def write_identity(doc: Any, name: str, identity: str, *, whole_document: bool) 
 
     obj = doc.getObject(name) if name else None
     if name and obj is None:
-        raise DocumentError(doc.FileName, f"it has no object {name} any more")
+        raise DocumentError(doc.FileName, message("it has no object {name} any more", name=name))
     with others_unmarked(doc):
         if obj is not None:
             _set(obj, "SiloItemId", identity)

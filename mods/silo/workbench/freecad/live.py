@@ -18,6 +18,7 @@ from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import DocumentError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.key import Key
+from silo.bom.message import message
 from silo.bom.walk.document import LinkProblem, object_name
 from silo.bom.walk.links import extract, why
 from silo.bom.walk.roots import choose_assembly
@@ -68,7 +69,7 @@ def _refuse_entities(path: str) -> None:
         return  # FreeCAD will say so
     if b"<!" in re.sub(rb"<!--.*?-->", b"", beginning.split(b"<Document")[0], flags=re.DOTALL):
         raise DocumentError(
-            path, "its Document.xml declares a DOCTYPE, which FreeCAD never writes; not opened"
+            path, message("its Document.xml declares a DOCTYPE, which FreeCAD never writes; not opened")
         )
 
 
@@ -119,7 +120,7 @@ def why_object(document: Any, assembly: str, parts: Collection[Key], *, hardware
     cached = cached_document(document)
     top = cached.getObject(assembly) if assembly else choose_assembly(cached)
     if top is None:
-        raise DocumentError(document.FileName, f"it no longer holds {assembly}")
+        raise DocumentError(document.FileName, message("it no longer holds {assembly}", assembly=assembly))
     return why(top, parts, **_walking(), hardware=hardware)
 
 
@@ -225,7 +226,7 @@ class LinkInspector:
             return problem
         if problem.TypeId.startswith("Assembly::") and host.version() < ASSEMBLY_SINCE:
             return LinkProblem(FindingCode.LOST_ASSEMBLY, file, name)
-        return LinkProblem(FindingCode.BROKEN_LINK, file, name, "FreeCAD did not load it")
+        return LinkProblem(FindingCode.BROKEN_LINK, file, name, message("FreeCAD did not load it"))
 
 
 class _Owner:
@@ -252,13 +253,18 @@ def lost_assemblies(document: Any) -> list[str]:
 def _lost(document: Any, names: list[str]) -> Extraction:
     path = one_path(document.FileName)
     major, minor = host.version()
-    message = (
-        f"{document.Label} was saved by FreeCAD {document.getProgramVersion()}; this FreeCAD {major}.{minor} "
-        f"cannot load its assemblies ({', '.join(names)}). Do not save it here, that would destroy them; "
-        "open it with FreeCAD 1.0 or newer."
+    text = message(
+        "{label} was saved by FreeCAD {getprogramversion}; this FreeCAD {major}.{minor} "
+        "cannot load its assemblies ({names}). Do not save it here, that would destroy "
+        "them; open it with FreeCAD 1.0 or newer.",
+        label=document.Label,
+        getprogramversion=document.getProgramVersion(),
+        major=major,
+        minor=minor,
+        names=", ".join(names),
     )
     finding = Finding(
-        FindingCode.LOST_ASSEMBLY, Severity.ERROR, message, tuple(Place(path, name) for name in names)
+        FindingCode.LOST_ASSEMBLY, Severity.ERROR, text, tuple(Place(path, name) for name in names)
     )
     head = BomEntry(
         doc_path=path, level=0, object_name=names[0], label=document.Label, document_label=document.Label

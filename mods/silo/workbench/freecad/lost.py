@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 from typing import Any
 
+from silo.bom.message import message
 from silo.workbench.freecad import host
 
 # File → its state, and the name, label and type of each object of a type that this FreeCAD does not know.
@@ -22,7 +23,7 @@ def lost_objects(doc: Any) -> list[str]:
     if not doc.FileName or _is_ours(doc.getProgramVersion()):
         return []
     return [
-        f"{label} ({kind})"
+        message("{label} ({kind})", label=label, kind=kind)
         for name, (label, kind) in _of_unknown_types(doc).items()
         if doc.getObject(name) is None
     ]
@@ -33,8 +34,10 @@ def refuse_loss(doc: Any) -> None:
     from silo.bom.errors import DocumentError
 
     if lost := lost_objects(doc):
-        text = f"made by a newer FreeCAD; saving it here would destroy {', '.join(lost)}"
-        raise DocumentError(doc.FileName, f"{text}. Open and change it in the newer FreeCAD")
+        text = message("made by a newer FreeCAD; saving it here would destroy {lost}", lost=", ".join(lost))
+        raise DocumentError(
+            doc.FileName, message("{text}. Open and change it in the newer FreeCAD", text=text)
+        )
 
 
 def _is_ours(program: str) -> bool:

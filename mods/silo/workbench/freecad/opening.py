@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from silo.bom.message import message
 from silo.workbench.freecad import host
 from silo.workbench.freecad.modified import is_modified
 
@@ -22,10 +23,15 @@ def open_fully(path: str) -> Any:
         return document
     if document is not None and is_modified(document):
         raise DocumentError(
-            path, "FreeCAD has loaded it only in part and it has unsaved edits, which opening it would lose"
+            path,
+            message(
+                "FreeCAD has loaded it only in part and it has unsaved edits, which opening it would lose"
+            ),
         )
     with host.same_active_document():
         try:
             return host.open_document(document.FileName if document is not None else path)
         except (OSError, RuntimeError) as problem:
-            raise DocumentError(path, f"FreeCAD cannot open it: {problem}") from problem
+            raise DocumentError(
+                path, message("FreeCAD cannot open it: {problem}", problem=problem)
+            ) from problem

@@ -7,6 +7,7 @@ from typing import Any
 
 from silo.bom.errors import DocumentError
 from silo.bom.findings import Finding
+from silo.bom.message import message
 from silo.bom.walk.document import LinkProblem, located
 from silo.workbench.freecad import host, live
 from silo.workbench.freecad.opening import open_fully
@@ -42,5 +43,8 @@ def relink(finding: Finding) -> list[str]:
 def _target(meant: Any, problem: LinkProblem) -> Any:
     target = meant.getObject(problem.obj)
     if target is None:
-        raise DocumentError(meant.FileName, f"it holds no object named {problem.obj!r}; nothing was changed")
+        raise DocumentError(
+            meant.FileName,
+            message("it holds no object named {obj}; nothing was changed", obj=repr(problem.obj)),
+        )
     return target

@@ -13,6 +13,7 @@ from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import Any
 
+from silo.bom.message import message
 from silo.platform.stamp import stamp_of
 from silo.workbench.freecad import host
 from silo.workbench.freecad.damage import DAMAGED, damage
@@ -30,22 +31,24 @@ def save(doc: Any, *, mark_parents: bool = False) -> None:
 
     path = doc.FileName
     if not path:
-        raise DocumentError(doc.Label, "it has never been saved; save it under a name first")
+        raise DocumentError(doc.Label, message("it has never been saved; save it under a name first"))
     if host.is_partial(doc):
-        raise DocumentError(path, "FreeCAD has loaded it only in part and cannot save it")
+        raise DocumentError(path, message("FreeCAD has loaded it only in part and cannot save it"))
     if not is_writable(path):
-        raise DocumentError(path, "the file is read-only")
+        raise DocumentError(path, message("the file is read-only"))
     if (damaged := damage(path)) is not None:
-        raise DocumentError(path, f"{damaged.reason}; {DAMAGED}")
+        raise DocumentError(path, message("{reason}; {damaged}", reason=damaged.reason, damaged=DAMAGED))
     refuse_loss(doc)
     before = stamp_of(path)
     try:
         with nullcontext() if mark_parents else others_unmarked(doc):
             _save(doc)
     except (OSError, RuntimeError) as problem:
-        raise DocumentError(path, f"FreeCAD could not save it: {problem}") from problem
+        raise DocumentError(
+            path, message("FreeCAD could not save it: {problem}", problem=problem)
+        ) from problem
     if stamp_of(path) == before:
-        raise DocumentError(path, "FreeCAD did not write the file; its report view says why")
+        raise DocumentError(path, message("FreeCAD did not write the file; its report view says why"))
 
 
 def _save(doc: Any) -> None:
@@ -78,9 +81,11 @@ def save_copy(doc: Any, path: Path) -> None:
         else:
             doc.saveCopy(str(path))
     except (OSError, RuntimeError) as problem:
-        raise DocumentError(str(path), f"no copy could be kept: {problem}") from problem
+        raise DocumentError(
+            str(path), message("no copy could be kept: {problem}", problem=problem)
+        ) from problem
     if not path.is_file():
-        raise DocumentError(str(path), "FreeCAD wrote no copy; its report view says why")
+        raise DocumentError(str(path), message("FreeCAD wrote no copy; its report view says why"))
 
 
 def save_marked(doc: Any) -> None:

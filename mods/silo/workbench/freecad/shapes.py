@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from silo.bom.errors import DocumentError
+from silo.bom.message import message
 from silo.bom.walk.document import LinkProblem, own
 from silo.inertia.assembly import Assembly, SolidProps
 from silo.inertia.geometry.exact import (
@@ -116,7 +117,7 @@ def _edges(face: Any, wire: Any) -> Iterator[Any]:
 def _curve(face: Any, edge: Any) -> Curve:
     curve_on_surface = face.curveOnSurface(edge)
     if curve_on_surface is None:
-        raise ValueError("an edge has no curve on its face")
+        raise ValueError(message("an edge has no curve on its face"))
     curve, first, last = curve_on_surface
     kind = type(curve).__name__
     sign = -1.0 if edge.Orientation == _BACKWARDS else 1.0
@@ -265,7 +266,9 @@ def read_live(document: Any, options: ReadOptions, report: Report) -> Assembly:
     source = document.FileName or document.Label
     report("reading", 0, 0)
     if lost := live.lost_assemblies(document):
-        raise DocumentError(source, f"this FreeCAD is too old to load its assemblies ({', '.join(lost)})")
+        raise DocumentError(
+            source, message("this FreeCAD is too old to load its assemblies ({lost})", lost=", ".join(lost))
+        )
     cached = live.cached_document(document)
     walk = Walk(LiveFacts(), os.path.dirname(cached.FileName).replace("\\", "/"), options.hardware)
     top = walk.top(cached, options.object_name)
@@ -374,7 +377,11 @@ class _Product:
         solids += shells
         bodies: list[Body] = []
         for number, (solid, matrix) in enumerate(solids, start=1):
-            where = f"solid {number} of {len(solids)}: " if len(solids) > 1 else ""
+            where = (
+                message("solid {number} of {count}: ", number=number, count=len(solids))
+                if len(solids) > 1
+                else ""
+            )
             known, moved = self._find(solid, where)
             if known.props is not None:
                 bodies.append(_placed(known, matrix @ moved, solid, matrix))
@@ -430,7 +437,7 @@ class _Product:
 
         def told() -> Any:
             for number, face in enumerate(faces, start=1):
-                self.report("measuring faces", number, len(faces))
+                self.report(message("measuring faces"), number, len(faces))
                 yield face_of(face)
 
         rough = abs(solid.Volume) or radius**3
@@ -449,16 +456,20 @@ def _weighed(solid: Any, ours: Moments, notes: list[Note]) -> Moments:
         notes.append(
             Note(
                 GeometryCode.NOT_CONVERGENT,
-                "measured by FreeCAD's own integration, which has no error control: on real parts it was off "
-                "by up to 0.7 %",
+                message(
+                    "measured by FreeCAD's own integration, which has no error control: on real "
+                    "parts it was off by up to 0.7 %"
+                ),
             )
         )
         tensor = np.array(solid.MatrixOfInertia.A, dtype=np.float64).reshape(4, 4)[:3, :3]
         return Moments(volume, np.array(tuple(solid.CenterOfMass)), tensor, 0.0)
     if ours.drift > STATED:  # if the faces close, FreeCAD is wrong
         apart = abs(volume / ours.volume - 1)
-        message = f"FreeCAD's own volume differs by {apart:.1%}; the geometry may be bad"
-        notes.append(Note(GeometryCode.NOT_CONVERGENT, message))
+        text = message(
+            "FreeCAD's own volume differs by {apart}; the geometry may be bad", apart=f"{apart:.1%}"
+        )
+        notes.append(Note(GeometryCode.NOT_CONVERGENT, text))
     return ours
 
 

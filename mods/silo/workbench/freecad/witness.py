@@ -18,6 +18,7 @@ from typing import Any
 from silo.bom.entry import BomEntry, Extraction, walk_entries
 from silo.bom.findings import FindingCode
 from silo.bom.key import Key
+from silo.bom.message import joined, message
 from silo.bom.walk.chains import chains
 from silo.bom.walk.contents import Count, Lost
 from silo.bom.walk.document import object_name
@@ -95,23 +96,38 @@ class SolidCount:
 
     def sentence(self) -> str:
         """Describe the comparison in a sentence, for people."""
-        solids = "1 solid" if self.shown == 1 else f"{self.shown} solids"
+        solids = message("1 solid") if self.shown == 1 else message("{shown} solids", shown=self.shown)
         file = os.path.basename(self.doc_path)
-        text = f"{self.label} in {file}: the view has {solids}, the BOM explains {self.explained}"
-        further = (
-            (self.hidden, "of these hidden"),
-            (self.beside, "beside the assembly"),
-            (self.sources, "hidden sources that do not count"),
-            (self.left_out, "left out as the findings say"),
+        text = message(
+            "{label} in {file}: the view has {solids}, the BOM explains {explained}",
+            label=self.label,
+            file=file,
+            solids=solids,
+            explained=self.explained,
         )
-        text = ", ".join((text, *(f"{number} {words}" for number, words in further if number)))
+        further = (
+            (self.hidden, message("of these hidden")),
+            (self.beside, message("beside the assembly")),
+            (self.sources, message("hidden sources that do not count")),
+            (self.left_out, message("left out as the findings say")),
+        )
+        more = [
+            message("{number} {words}", number=number, words=words) for number, words in further if number
+        ]
+        text = joined(", ", (text, *more))
         if self.agrees:
             return f"{text}."
         texts = [
-            f"{row.label} ({row.why}: shown {row.shown}, explained {row.explained})"
+            message(
+                "{label} ({why}: shown {shown}, explained {explained})",
+                label=row.label,
+                why=row.why,
+                shown=row.shown,
+                explained=row.explained,
+            )
             for row in self.differences[:8]
         ]
-        return f"{text}. They differ; look at: {', '.join(texts)}."
+        return message("{text}. They differ; look at: {texts}.", text=text, texts=", ".join(texts))
 
     def as_dict(self) -> dict[str, Any]:
         """Return the comparison as JSON values."""
@@ -221,7 +237,7 @@ class _Witness:
             if is_shown or is_taken:
                 account.sources += seen.hidden
             else:
-                account.differ(obj, 0, 0, "hidden and not counted")
+                account.differ(obj, 0, 0, message("hidden and not counted"))
         elif (
             seen.shown < explained <= seen.shown + seen.hidden
             and may_hide
@@ -236,7 +252,7 @@ class _Witness:
             account.left_out += seen.shown
         else:
             account.differ(
-                obj, seen.shown, explained, "counted" if explained else "neither counted nor named"
+                obj, seen.shown, explained, "counted" if explained else message("neither counted nor named")
             )
 
     def _drawn(self, count: Count, tree: Tree | None) -> Any:
@@ -262,7 +278,7 @@ class _Witness:
             if number:
                 total = pieces[path, name]
                 account.differences.append(
-                    SolidDifference(name, name, total, total - number, "line of the BOM")
+                    SolidDifference(name, name, total, total - number, message("line of the BOM"))
                 )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from silo.bom.message import message
 from silo.workbench.gui import qt, widgets
 from silo.workbench.gui.qt import QtCore, QtWidgets
 from silo.workbench.tone import Tone
@@ -74,4 +75,8 @@ class MassDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no type
     def _copy(self) -> None:
         """Copy the table to the clipboard, with plain numbers in kg."""
         name, quantity, mass, whole, *rest = self.headings()
-        qt.copy(self._content.table((name, quantity, f"{mass}, kg", f"{whole}, kg", *rest)))
+        qt.copy(
+            self._content.table(
+                (name, quantity, message("{mass}, kg", mass=mass), message("{whole}, kg", whole=whole), *rest)
+            )
+        )

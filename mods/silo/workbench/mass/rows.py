@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from silo.bom.message import message
 from silo.inertia.codes import MassCode, Source
 from silo.inertia.report import InertiaReport, PartResult
 from silo.workbench.words import counted, spoken, translate
@@ -112,4 +113,4 @@ def mass_text(mass: float) -> str:
     """Write a mass [kg] in a suitable unit: ``12.3 g``, ``1.2346 kg``; a dash for none."""
     if mass == 0:
         return "–"
-    return f"{mass * 1e3:.5g} g" if abs(mass) < 1 else f"{mass:.5g} kg"
+    return f"{mass * 1e3:.5g} g" if abs(mass) < 1 else message("{mass} kg", mass=f"{mass:.5g}")

@@ -6,6 +6,7 @@ from __future__ import annotations
 import time
 
 from silo.bom.errors import CancelledError
+from silo.bom.message import message
 from silo.workbench.freecad import host
 from silo.workbench.gui.qt import QtCore, QtWidgets
 from silo.workbench.words import translate
@@ -56,4 +57,4 @@ class WaitingWindow:
             self._window.setLabelText(self._part)
         QtWidgets.QApplication.processEvents()
         if self._window.wasCanceled():
-            raise CancelledError("measuring was cancelled")
+            raise CancelledError(message("measuring was cancelled"))

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from silo.bom.errors import DocumentError, SiloError
+from silo.bom.message import message
 from silo.outbox.store import KEPT_ASIDE_DAYS
 from silo.platform.user_folders import cache_folder
 from silo.workbench.activity.box import own_box
@@ -179,7 +180,9 @@ class RevisionFlow:
                 with content.open("rb") as read, replacing(path, mode=0o644) as write:
                     shutil.copyfileobj(read, write)
             except OSError as error:
-                raise DocumentError(path, f"cannot be written ({error.strerror or error})") from error
+                raise DocumentError(
+                    path, message("cannot be written ({error})", error=error.strerror or error)
+                ) from error
             remove_patiently(content)
         if doc is not None:
             self._desk.close(doc)

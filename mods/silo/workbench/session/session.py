@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.errors import ConfigError, PackageError, SiloError
+from silo.bom.message import message
 from silo.outbox.entry import Commit, State
 from silo.outbox.entry import Entry as Waiting
 from silo.outbox.store import OutboxError, Store
@@ -280,7 +281,7 @@ class Session:
 
         def done(outcome: tuple[int, list[str]]) -> None:
             for problem in outcome[1]:
-                self._listener.console(f"[Silo] {spoken(problem)}")
+                self._listener.console(message("[Silo] {problem}", problem=spoken(problem)))
 
         title = translate("Silo", "Drawing models")
         self._models.submit(Job(title, run, done=done))
@@ -405,7 +406,7 @@ class Session:
 
     def look(self, work: Callable[[], object]) -> None:
         """Read files in a worker; the result is not waited for."""
-        self._looks.submit(Job("Reading files", lambda _control: work()))
+        self._looks.submit(Job(message("Reading files"), lambda _control: work()))
 
     def newer_than(self, identity: str, since: float) -> Newer | None:
         """Return a colleague's commit of an item after ``since`` (:func:`time.monotonic`), if the server
@@ -469,7 +470,7 @@ class Session:
         if error.code != "cancelled":
             self._show(reason=str(error))
             if error.code != "bad_config":
-                self._listener.console(f"[Silo] {spoken(error)}")
+                self._listener.console(message("[Silo] {error}", error=spoken(error)))
 
     def _show(self, **changes: Any) -> None:
         shown = replace(self.shown, **changes)

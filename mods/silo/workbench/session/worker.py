@@ -14,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from silo.bom.message import message
 from silo.workbench.garbage import collection_off
 
 if TYPE_CHECKING:
@@ -167,12 +168,21 @@ class Worker:
             failure = error
         except ImportError as error:
             name = (error.name or str(error)).partition(".")[0]
-            failure = PackageError(f"FreeCAD's Python cannot import the package {name}: {error}")
+            failure = PackageError(
+                message("FreeCAD's Python cannot import the package {name}: {error}", name=name, error=error)
+            )
             if name == "silo":
                 self._on_bug(error)
         except Exception as error:  # noqa: BLE001  # a bug in one job must not end the thread for all others
             self._on_bug(error)
-            failure = SiloError(f"{job.title}: unexpected problem ({type(error).__name__}: {error})")
+            failure = SiloError(
+                message(
+                    "{title}: unexpected problem ({name}: {error})",
+                    title=job.title,
+                    name=type(error).__name__,
+                    error=error,
+                )
+            )
         else:
             return lambda: job.done(result)
         return lambda: job.failed(failure)

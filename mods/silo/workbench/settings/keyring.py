@@ -11,6 +11,7 @@ import importlib.util
 from typing import Any
 
 from silo.bom.errors import ConfigError
+from silo.bom.message import message
 
 SERVICE = "silo-mod"
 
@@ -51,7 +52,7 @@ class Keyring:
     def set(self, url: str, token: str) -> None:
         """Keep a token; "" removes it. :class:`ConfigError` if the keyring refuses it."""
         if not self.name():
-            raise ConfigError("this system has no keyring that could keep the token")
+            raise ConfigError(message("this system has no keyring that could keep the token"))
         module = self._load()
         try:
             if token:
@@ -59,7 +60,7 @@ class Keyring:
             elif module.get_password(SERVICE, _key(url)) is not None:
                 module.delete_password(SERVICE, _key(url))
         except Exception as error:  # translated for the person who pressed the button
-            raise ConfigError(f"the keyring did not keep the token: {error}") from error
+            raise ConfigError(message("the keyring did not keep the token: {error}", error=error)) from error
 
     def _load(self) -> Any:
         if self._module is None and importlib.util.find_spec("keyring") is not None:

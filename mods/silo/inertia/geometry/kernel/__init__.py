@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from silo.bom.errors import ConfigError
+from silo.bom.message import message
 from silo.inertia.geometry.together import Box, Floats, Mesh, exact_box, joined, mesh_volume
 
 try:
@@ -21,20 +22,28 @@ try:
 except ImportError as error:
     if "cannot open shared object file" in str(error):
         raise ConfigError(
-            f"the geometry kernel lacks a library of the system ({error}). "
-            "On Debian and Ubuntu: apt-get install libgl1"
+            message(
+                "the geometry kernel lacks a library of the system ({error}). On Debian and "
+                "Ubuntu: apt-get install libgl1",
+                error=error,
+            )
         ) from error
     if not isinstance(error, ModuleNotFoundError):  # as where a limit of memory leaves no room for it
         raise
     raise ConfigError(
-        "STEP files and FreeCAD shapes need the geometry kernel, which is not installed: "
-        'pip install "silo-mod[inertia]"'
+        message(
+            "STEP files and FreeCAD shapes need the geometry kernel, which is not installed: "
+            'pip install "silo-mod[inertia]"'
+        )
     ) from error
 
 if int(OCP.__version__.split(".")[0]) < 8:
     raise ConfigError(
-        f"the geometry kernel OCP {OCP.__version__} loses placements that scale or mirror; wanted version 8: "
-        'pip install "silo-mod[inertia]"'
+        message(
+            "the geometry kernel OCP {version} loses placements that scale or mirror; wanted "
+            'version 8: pip install "silo-mod[inertia]"',
+            version=OCP.__version__,
+        )
     )
 
 from OCP.Bnd import Bnd_Box

@@ -69,6 +69,7 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Shape
 
 from silo.bom.errors import DocumentError
+from silo.bom.message import message
 from silo.inertia.assembly import Assembly, Instance, SolidProps
 from silo.inertia.geometry import kernel as occt
 from silo.inertia.geometry.exact import (
@@ -573,7 +574,11 @@ def measure(shapes: list[Any], *, eps: float, mesh_check: bool) -> Measured:
         key = (id(body), solid.Orientation())
         if key not in bares:
             bares[key] = _measured(solid.Located(TopLoc_Location()), body, eps, picture)
-            where = f"solid {number} of {len(measured_bodies)}: " if len(measured_bodies) > 1 else ""
+            where = (
+                message("solid {number} of {count}: ", number=number, count=len(measured_bodies))
+                if len(measured_bodies) > 1
+                else ""
+            )
             problems += [replace(note, message=where + note.message) for note in bares[key].notes]
         bodies += _placed(bares[key], solid)
     settled = together(bodies, KernelCommon(), problems)
@@ -683,14 +688,14 @@ def _triangulated_solid(solid: Any, notes: list[Note]) -> tuple[SolidProps | Non
     """
     mesh, missing = triangles(solid)
     if missing or not len(mesh):
-        message = "the solid mixes triangles and surfaces, or has neither; it is left out"
-        notes.append(Note(GeometryCode.INVALID_SHAPE, message))
+        text = message("the solid mixes triangles and surfaces, or has neither; it is left out")
+        notes.append(Note(GeometryCode.INVALID_SHAPE, text))
         return None, mesh if len(mesh) else None
     props = enclosed(mesh := welded(mesh.vertices, mesh.faces), notes)
     if props.volume_m3 == 0.0:
         notes.append(NO_VOLUME)
         return None, mesh
-    notes.append(Note(GeometryCode.READER, "the solid is given as triangles, and measured as such"))
+    notes.append(Note(GeometryCode.READER, message("the solid is given as triangles, and measured as such")))
     return props, mesh
 
 
@@ -711,7 +716,7 @@ def load_shape(path: Path, named: str) -> Any:
     else:
         done = BRepTools.Read_s(shape, str(path), BRep_Builder())
     if done is False or shape.IsNull():
-        raise DocumentError(named, "holds no shape that the geometry kernel can read")
+        raise DocumentError(named, message("holds no shape that the geometry kernel can read"))
     return shape
 
 
@@ -760,4 +765,4 @@ def _store(shapes: list[Any], path: Path) -> None:
     for shape in shapes:
         builder.Add(whole, shape)
     if not BinTools.Write_s(whole, str(path)):
-        raise DocumentError(str(path), "cannot be written")
+        raise DocumentError(str(path), message("cannot be written"))
