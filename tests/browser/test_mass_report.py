@@ -97,6 +97,15 @@ def test_the_view_turns_and_hides_links(opened: Callable[..., Page]) -> None:
     assert [word for word in page.said if not word.startswith("file:") or not word.endswith("r.html")] == []
 
 
+def test_the_page_begins_with_the_sum(opened: Callable[..., Page]) -> None:
+    """BOM total, counted and what is missing stand above all else, and a name in it is text."""
+    page = opened()
+    line = page.locator("#sum")
+    expect(line).to_contain_text("BOM total")
+    expect(line).to_contain_text("counted")
+    assert box_of(line)["y"] < box_of(page.locator("#view"))["y"]
+
+
 def test_clicks_give_parts_to_links_and_save_the_map(opened: Callable[..., Page], tmp_path: Path) -> None:
     """A new link, a part clicked into it, one chosen in the table, two links made one; the map reads back."""
     page: Any = opened()

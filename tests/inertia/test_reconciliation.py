@@ -77,10 +77,16 @@ def test_pieces_that_the_geometry_lacks_or_has_more_of() -> None:
 
 def test_the_sums_and_their_differences_agree() -> None:
     bolt, one = _cube("bolt", CM3)
-    found = _report([(bolt, one)], _row("bolt", 0.008, 2, quantity=3.0), _row("tape", 0.1, 3)).reconciliation
+    rows = (
+        _row("bolt", 0.008, 2, quantity=3.0),
+        _row("tape", 0.1, 3),
+        _row("plate", None, 4, material="steel"),
+    )
+    found = _report([(bolt, one), _cube("plate", CM3, 0.1)], *rows).reconciliation
     assert found is not None
     assert found.bom is not None
-    assert found.bom - found.missing_kg + found.double_kg == pytest.approx(found.counted)
+    assert found.bom - found.missing_kg + found.double_kg + found.estimated == pytest.approx(found.counted)
+    assert "0.00785 kg of it by densities" in found.sentence
 
 
 def test_a_part_that_stands_twice_at_one_place_is_double() -> None:

@@ -18,6 +18,7 @@ import numpy as np
 from silo.bom.message import Message, joined, message
 from silo.inertia.assembly import Assembly
 from silo.inertia.bom.table import BOMEntry, BomTable
+from silo.inertia.codes import Source
 from silo.inertia.masses import Placed
 from silo.inertia.matching import Matching
 
@@ -36,10 +37,17 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class Reconciliation:
-    """The two sums [kg] and their differences. ``bom``: None if no row has a mass."""
+    """The two sums [kg] and their differences.
+
+    bom
+        None if no row has a mass.
+    estimated
+        of what was counted, the mass that no BOM mass and no scale says: volumes times densities.
+    """
 
     bom: float | None
     counted: float
+    estimated: float = 0.0
     not_counted: tuple[Difference, ...] = ()
     double: tuple[Difference, ...] = ()
 
@@ -64,6 +72,8 @@ class Reconciliation:
                 "BOM total {bom} kg · counted {counted} kg", bom=f"{self.bom:.6g}", counted=counted
             )
         parts: list[Message] = [head]
+        if self.bom is not None and self.estimated > NOTHING:
+            parts.append(message("{kg} kg of it by densities", kg=f"{self.estimated:.6g}"))
         if self.not_counted:
             parts.append(
                 message(
@@ -101,9 +111,18 @@ def reconciled(
     return Reconciliation(
         bom_total(table),
         float(placed.mass.sum()),
+        _estimated(placed),
         tuple(_not_counted(table, matching, placed, pieces)),
         (*more, *again),
     )
+
+
+_SAID = (Source.BOM_MASS, Source.SUB_ASSEMBLY_MASS, Source.TARGET_MASS)
+
+
+def _estimated(placed: Placed) -> float:
+    said = np.array([decision.source in _SAID for decision in placed.decisions], bool)
+    return float(placed.mass[~said].sum())
 
 
 def bom_total(table: BomTable) -> float | None:

@@ -41,6 +41,7 @@ def _reconciliation(found: Reconciliation | None) -> dict[str, Any] | None:
     return {
         "bom": found.bom,
         "counted": found.counted,
+        "estimated": found.estimated,
         "not_counted": [_difference(one) for one in found.not_counted],
         "double": [_difference(one) for one in found.double],
         "message": found.sentence,
