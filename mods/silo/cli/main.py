@@ -17,7 +17,7 @@ from typing import Any
 
 from silo import spoken
 from silo.bom.errors import CancelledError, Exit, InputError, SiloError, exit_of
-from silo.bom.message import message
+from silo.bom.message import beside, message
 from silo.cli.parser import build_parser
 from silo.cli.streams import OutputStream, open_streams
 
@@ -119,7 +119,8 @@ def _run_each(args: argparse.Namespace) -> int:
 
 def _as_json(error: SiloError) -> dict[str, Any]:
     problems = list(getattr(error, "problems", ()))
-    return {"error": {"code": error.code, "message": str(error).strip(), "problems": problems}}
+    text = str(error)
+    return {"error": {"code": error.code, "message": text.strip(), **beside(text), "problems": problems}}
 
 
 def _failed(error: SiloError, words: Sequence[str]) -> int:
