@@ -20,8 +20,12 @@ _XACRO = re.compile(rb"<robot\b[^>]{0,4000}\bxmlns:xacro\s{0,100}=")
 
 
 def is_xacro(data: bytes) -> bool:
-    """Return True if a robot's root element names the namespace of xacro."""
-    return _XACRO.search(data[:HEAD]) is not None
+    """Return True if a robot's root element names the namespace of xacro, and anything in it is of xacro.
+
+    Expanded files often keep the namespace.
+    """
+    used = any(mark in data for mark in (b"<xacro:", b"${", b"$("))
+    return used and _XACRO.search(data[:HEAD]) is not None
 
 
 def expanded(path: Path) -> bytes:
@@ -48,11 +52,10 @@ def expanded(path: Path) -> bytes:
 def refuse_writing(path: Path) -> None:
     """Raise InputError for a xacro file: its macros would be lost, or filled by half."""
     try:
-        with path.open("rb") as stream:
-            head = stream.read(HEAD)
+        data = path.read_bytes() if path.is_file() else b""
     except OSError:
         return
-    if is_xacro(head):
+    if is_xacro(data):
         raise InputError(
             message(
                 "{file} is a xacro file, and nothing is written into it: one macro may stand for several "

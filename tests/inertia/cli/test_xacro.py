@@ -74,3 +74,5 @@ def test_a_xacro_file_is_weighed_expanded_and_the_expanded_urdf_is_written(
 def test_a_xacro_file_is_known_by_its_root() -> None:
     assert is_xacro(XACRO.encode())
     assert not is_xacro(b'<robot name="r"><!-- xmlns:xacro="x" --></robot>')
+    namespace = b'<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="a"/></robot>'
+    assert not is_xacro(namespace)  # what an expansion often leaves
