@@ -64,6 +64,7 @@ from silo.bom.errors import (
     RejectedError,
     VersionConflictError,
 )
+from silo.bom.find_numbers import NewLine, give_numbers
 from silo.bom.left_out import Reason, remembered, what_holds
 from silo.bom.text import name_key
 from silo.bom.units import counts_pieces
@@ -94,6 +95,7 @@ class Stored:
     attached: list[str] = field(default_factory=list)  # the documents of its attachments
     kind: str = MODEL  # of a document
     lines: list[dict[str, Any]] = field(default_factory=list)
+    gone: dict[str, str] = field(default_factory=dict)  # find number → part of the lines that were removed
 
     @property
     def newest(self) -> Revision | None:
@@ -249,7 +251,7 @@ class FakeStore:
         self, stored: Stored, lines: list[dict[str, Any]] | None, event: str, data: dict[str, Any]
     ) -> None:
         if lines is not None:
-            stored.lines = lines
+            stored.lines = numbered(stored, lines)
             stored.item = stored.item.model_copy(update={"bom_version": (stored.item.bom_version or 0) + 1})
         self._announce(event, data)
 
@@ -362,6 +364,7 @@ def entries_of(request: MergeRequest, numbers: Mapping[str, str]) -> list[dict[s
             "child_part_number": numbers[entry.child_part_number.casefold()],
             "quantity": entry.quantity,
             "components": [component.model_dump() for component in entry.components or ()],
+            "find_number": entry.find_number,
         }
         for entry in request.entries
     ]
@@ -379,6 +382,27 @@ def with_components(
     before = {line["child_part_number"]: line.get("components", []) for line in lines}
     after = remembered(before, entries, kept)
     return [{**line, "components": after.get(line["child_part_number"], [])} for line in lines]
+
+
+def numbered(stored: Stored, lines: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Give each new line its find number, as a server does."""
+    before = {line["child_part_number"]: line for line in stored.lines}
+    after = {line["child_part_number"] for line in lines}
+    for number, line in before.items():
+        if number not in after and line.get("find_number"):
+            stored.gone[line["find_number"]] = number
+    new = [line for line in lines if line["child_part_number"] not in before]
+    there = [line["find_number"] for line in lines if line.get("find_number") and line not in new]
+    asking = [
+        NewLine(line["child_part_number"], line.get("find_number"), line["source"] == "manual")
+        for line in new
+    ]
+    numbers, stored.gone = give_numbers(asking, there, stored.gone)
+    given = {line["child_part_number"]: number for line, number in zip(new, numbers, strict=True)}
+    return [
+        {**line, "find_number": given.get(line["child_part_number"], line.get("find_number"))}
+        for line in lines
+    ]
 
 
 def check_cycle(bom: Bom, parent: str, children: Sequence[str]) -> None:
@@ -584,7 +608,7 @@ class FakeSilo(FakeStore):
             check_cycle(self.get_bom, stored.item.part_number, [number])
             new = {**line.model_dump(exclude_none=True), "child_part_number": number, "source": "manual"}
             self._write(stored, [*stored.lines, new], "bom.updated", {"item": stored.item.part_number})
-            return self._line(stored, new)
+            return self._line(stored, stored.lines[-1])
 
     def update_bom_line(self, part_number: str, child: str, /, **changes: Any) -> BomLine:
         given = body(LineBody, changes, "a BOM line").model_dump(exclude_none=True)
@@ -663,6 +687,11 @@ class FakeSilo(FakeStore):
                 left_out=result.left_out,
             )
             lines = apply_merge(stored.lines, plan, self._clock().isoformat()) if plan.writes else None
+            proposed = {entry["child_part_number"]: entry["find_number"] for entry in entries[::-1]}
+            added = {change.part_number for change in plan.diff.added}
+            for line in lines or ():
+                if line["child_part_number"] in added:
+                    line["find_number"] = proposed[line["child_part_number"]]
             self._write(stored, lines, MERGE, event.model_dump(mode="json", exclude_none=True))
             kept = [change.part_number for change in plan.diff.kept]
             stored.lines = with_components(stored.lines, entries, kept)

@@ -14,6 +14,7 @@ from typing import Any
 from silo.bom.errors import (
     ConfigError,
 )
+from silo.bom.find_numbers import MOST_STEP, STEP
 from silo.bom.numbers import yes_or_no
 from silo.file_kind import ATTACHMENT_KINDS
 from silo.platform.user_folders import data_folder
@@ -65,6 +66,8 @@ class Settings:
         kinds of attachments that each part of one's own needs for a release, with commas: ``drawing, step``.
     release_approvals, release_override
         how many people approve a revision, and whether they may release what is blocked, with a reason.
+    find_number_step
+        the distance of the numbers that the lines of a BOM get: 10 for 10, 20, 30.
     history_days, audit_days
         older changes of BOMs are folded into one, older lines of the audit list deleted; 0 keeps all.
     """
@@ -103,6 +106,7 @@ class Settings:
     release_approvals: int = 1
     release_override: bool = True
     release_wants: str = ""
+    find_number_step: int = STEP
     admin_username: str = "admin"
     admin_password: str | None = None
 
@@ -118,6 +122,11 @@ class Settings:
             raise ConfigError(f"release labels: wanted letters or numbers, got {self.release_labels!r}")
         if self.release_approvals < 1:
             raise ConfigError(f"release approvals: wanted 1 or more, got {self.release_approvals}")
+        if not 1 <= self.find_number_step <= MOST_STEP:
+            raise ConfigError(
+                f"find number step: wanted 1 to {MOST_STEP}, such as 10 for 10, 20, 30, "
+                f"got {self.find_number_step}"
+            )
         if unknown := [kind for kind in self.release_kinds if kind not in ATTACHMENT_KINDS]:
             raise ConfigError(
                 f"release wants: wanted kinds ({', '.join(ATTACHMENT_KINDS)}), got {', '.join(unknown)}"
@@ -181,7 +190,7 @@ _NAMES = (
         "public_url",
     ),
     *("admin_username", "admin_password", "freecad_version", "release_labels", "release_approvals"),
-    *("release_override", "release_wants", "trusted_proxies"),
+    *("release_override", "release_wants", "find_number_step", "trusted_proxies"),
 )
 _ENVIRONMENT = {name: f"SILO_{name.upper()}" for name in _NAMES} | {"files_dir": "SILO_STORAGE_ROOT_DIR"}
 

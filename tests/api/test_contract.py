@@ -552,3 +552,24 @@ def test_an_archived_item_is_found_no_more(silo: Silo) -> None:
     assert silo.get_item_by_uuid(item.id) is None
     with pytest.raises(NotFoundError):
         silo.archive_item(number)
+
+
+def test_a_line_gets_its_find_number_once(silo: Silo) -> None:
+    """By the step; a free proposal of CAD is taken; what is removed comes back with its own number."""
+    top, *parts = make(silo, "Top", "A01"), *(make(silo, f"Part {n}") for n in range(4))
+    first = [MergeEntry(child_part_number=part, quantity=1) for part in parts[:2]]
+    silo.merge_bom(top, MergeRequest(entries=first))
+    more = [
+        *first,
+        MergeEntry(child_part_number=parts[2], quantity=1, find_number="20"),
+        MergeEntry(child_part_number=parts[3], quantity=1, find_number="33"),
+    ]
+    silo.merge_bom(top, MergeRequest(entries=more))
+    wanted = dict(zip(parts, ["10", "20", "40", "33"], strict=True))
+    assert {line.child_part_number: line.find_number for line in silo.get_bom(top)} == wanted
+    silo.remove_bom_line(top, parts[2])
+    new = make(silo, "New")
+    assert silo.add_bom_line(top, new).find_number == "50"
+    silo.merge_bom(top, MergeRequest(entries=more))
+    numbers = {line.child_part_number: line.find_number for line in silo.get_bom(top)}
+    assert numbers == wanted | {new: "50"}

@@ -307,12 +307,16 @@ class Component(Wire):
 
 
 class MergeEntry(Wire):
-    """One direct child in a merge request. ``components``: what it is in the CAD model, for the next sync."""
+    """One direct child in a merge request. ``components``: what it is in the CAD model, for the next sync.
+
+    ``find_number``: what the CAD model proposes for a new line; a number that another line has is not taken.
+    """
 
     child_part_number: str = Field(min_length=1)
     quantity: Quantity
     source: str = "assembly"
     components: list[Component] | None = None
+    find_number: Annotated[str | None, Field(max_length=32)] = None
 
 
 class LeftOutPart(Wire):

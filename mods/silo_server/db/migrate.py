@@ -901,6 +901,11 @@ def _exact_quantities(op: Operations) -> None:
                     left.append(f"{column} of {child} in {parent}: {row[column]!r} was rounded to {text}")
 
 
+def _find_numbers(op: Operations) -> None:
+    """Let a BOM remember the find numbers of removed lines until the next release."""
+    op.add_column("items", Column("gone_find_numbers", Text))
+
+
 STEPS: dict[str, Callable[[Operations], None]] = {
     "0007": _first_schema,
     "0008": _answers,
@@ -920,4 +925,5 @@ STEPS: dict[str, Callable[[Operations], None]] = {
     "0023": _held_boms,
     "0024": _graded_costs,
     "0025": _exact_quantities,
+    "0026": _find_numbers,
 }

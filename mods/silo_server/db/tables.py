@@ -126,6 +126,7 @@ items = Table(
     needed("updated_at", Stamp),
     needed("updated_by", String(64)),
     Column("archived_at", Stamp),
+    Column("gone_find_numbers", Text),
     Index(None, "archived_at", "part_number_key"),
     Index(None, "archived_at", "name", "part_number_key"),
     Index(None, "archived_at", "updated_at", "part_number_key"),

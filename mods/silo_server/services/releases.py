@@ -38,6 +38,7 @@ from silo_server.errors import TooLargeError
 from silo_server.events import announce
 from silo_server.fields import from_row
 from silo_server.services import audit
+from silo_server.services.bom.find_numbers import forget_gone
 from silo_server.services.items import get_item
 from silo_server.user_json import dumps
 from silo_server.values import Item
@@ -360,6 +361,7 @@ def _make_released(tx: Tx, item: Item, release: Release) -> None:
     earlier = (row.item_id == item.id) & (row.status == "released")
     tx.conn.execute(update(releases).where(earlier).values(status="obsolete"))
     _change(tx, release, status="released", ended_at=tx.stamp, ended_by=tx.actor.username)
+    forget_gone(tx, item)
     _announce(tx, item, release, "released")
 
 

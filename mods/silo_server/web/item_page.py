@@ -376,7 +376,7 @@ def _tree_keys(shown: ShownStructure) -> Mapping[str, Callable[[Line], Any]]:
     keys: dict[str, Callable[[Line], Any]] = _keys(
         lambda line: line, lambda line: line.state.quantity, shown.worth
     )
-    return keys | {"quantity": keys["total"]}
+    return keys | {"quantity": keys["total"], "position": lambda line: line.state.find_number}
 
 
 def flat_page(shown: ShownStructure) -> Page[Branch]:

@@ -402,6 +402,7 @@ def _show(call: Call, part_number: str, asked: PageState, status: int = 200) -> 
 _SORTS: Mapping[str, Callable[[Line], Any]] = {
     "number": lambda line: line.child_part_number.casefold(),
     "name": lambda line: line.child_name.casefold(),
+    "position": lambda line: line.state.find_number,
     "quantity": lambda line: line.state.quantity,
     "source": lambda line: line.state.source,
 }

@@ -10,7 +10,6 @@ from __future__ import annotations
 import uuid as uuids
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from itertools import count
 from typing import Any
 
@@ -22,44 +21,12 @@ from silo_server.db.tables import bom_change_lines, bom_changes, bom_lines, item
 from silo_server.db.transaction import Tx
 from silo_server.events import announce
 from silo_server.fields import names_of
+from silo_server.services.bom.find_numbers import with_numbers
+from silo_server.services.bom.line_record import ChangeKind, LineRecord
 from silo_server.services.bom.line_state import state_columns, state_to_json
 from silo_server.services.items import get_item
 from silo_server.user_json import dumps
-from silo_server.values import Item, LineState
-
-
-class ChangeKind(StrEnum):
-    """Why a BOM changed."""
-
-    MERGE = "merge"  # an assembly was synced
-    EDIT = "edit"  # a user added, changed or removed lines
-    RESOLVE = "resolve"  # a user decided on unreferenced lines or conflicts
-    IMPORT = "import"  # a CSV was imported
-    RESTORE = "restore"  # an earlier state was brought back
-    UNDO = "undo"  # one change was taken back
-    FOLDED = "folded"  # the state that changes led to which are no longer kept (SILO_HISTORY_DAYS)
-
-
-@dataclass(frozen=True, slots=True)
-class LineRecord:
-    """One line that becomes something else: ``before`` None = new, ``after`` None = removed.
-
-    ``position`` is its place in the BOM, None for a new line at the end.
-    """
-
-    line_id: str
-    child_id: int
-    before: LineState | None
-    after: LineState | None
-    position: int | None = None
-
-    @property
-    def action(self) -> str:
-        if self.before is None:
-            return "added"
-        if self.after is None:
-            return "removed"
-        return "changed"
+from silo_server.values import Item
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,7 +85,7 @@ def apply_changes(tx: Tx, parent: Item, changes: Sequence[LineRecord], note: Cha
     here; a merge has an event of its own.
     """
     version = parent.bom_version + (1 if changes else 0)
-    placed = _placed(tx, parent, changes)
+    placed = with_numbers(tx, parent, _placed(tx, parent, changes), note.kind)
     _write_lines(tx, parent, placed)
     change_id = tx.conn.execute(
         insert(bom_changes)

@@ -93,6 +93,7 @@ class _Prepared:
     accepted: Mapping[int, float]
     conflicts: Sequence[QuantityChange]  # all of them, accepted ones too
     before: LastSync
+    proposed: Mapping[str, str]  # part number → the find number that CAD proposes
 
 
 def preview_merge(tx: Tx, part_number: str, request: MergeRequestIn, expected: int | None) -> MergeOutcome:
@@ -112,9 +113,12 @@ def merge_bom(tx: Tx, part_number: str, request: MergeRequestIn, expected: int |
     item's newest file), MissingRevisionError (its file is not here).
     """
     parent = locked_parent(tx, part_number)
+    proposed = [(entry.key, entry.find_number) for entry in request.entries if entry.find_number]
     entries = [(entry.key, float(entry.quantity), entry.components) for entry in request.entries]
     document = (getattr(request, name) for name in names_of(MergeRequestIn) if name.startswith("document"))
-    keyed = KeyedRequest.of(f"merge {parent.id}", request.sync_id, entries, request.left_out, *document)
+    keyed = KeyedRequest.of(
+        f"merge {parent.id}", request.sync_id, entries, request.left_out, *document, *proposed
+    )
     if earlier := earlier_answer(tx, keyed):
         whole = earlier.text if earlier.change_id is None else rebuilt(tx, parent, earlier)
         return MergeOutcome(whole, earlier.version)
@@ -177,7 +181,8 @@ def _prepare(tx: Tx, parent: Item, request: MergeRequestIn) -> _Prepared:
     ]
     open_ones = tuple(c for c in conflicts if accepted.get(child_ids[c.part_number]) != _cad_quantity(c))
     plan = replace(plan, diff=replace(plan.diff, conflicts=open_ones))
-    return _Prepared(parent, lines, child_ids, plan, accepted, conflicts, before)
+    proposed = {names[entry.key]: entry.find_number for entry in request.entries[::-1] if entry.find_number}
+    return _Prepared(parent, lines, child_ids, plan, accepted, conflicts, before, proposed)
 
 
 def _children(
@@ -242,7 +247,11 @@ def _line_changes(tx: Tx, prepared: _Prepared) -> list[LineRecord]:
             new_line_id(),
             prepared.child_ids[added.part_number],
             None,
-            LineState(quantity_of(added.quantity or 0), "assembly"),
+            LineState(
+                quantity_of(added.quantity or 0),
+                "assembly",
+                find_number=prepared.proposed.get(added.part_number),
+            ),
         )
         for added in plan.diff.added
     ]

@@ -18,15 +18,22 @@ from silo.bom.quantities import LARGEST_QUANTITY, quantity_of
 from silo_server.errors import TooLargeError
 from silo_server.services.field_checks import quantity_problem, sha256_or_none, shortened, text_problem
 
+LONGEST_FIND_NUMBER = 32
+
 
 @dataclass(frozen=True, slots=True)
 class MergeRequestEntry:
-    """One direct child as requested; ``key`` is its case-folded number."""
+    """One direct child as requested; ``key`` is its case-folded number.
+
+    find_number
+        what CAD proposes for a new line.
+    """
 
     index: int
     part_number: str
     quantity: Decimal
     components: Sequence[Mapping[str, str]] = ()
+    find_number: str | None = None
 
     @property
     def key(self) -> str:
@@ -120,8 +127,13 @@ def _entry(index: int, raw: Any) -> tuple[MergeRequestEntry | None, str | None]:
         return None, missing if text is None else f"{missing}; {text}"
     # An entry with a bad quantity is still looked up, so that an unknown number is reported as well.
     components, wrong = _components(index, raw.get("components"))
-    entry = MergeRequestEntry(index, str(name).strip(), quantity_of(1 if text else quantity or 0), components)
-    return entry, "; ".join(filter(None, (text, wrong))) or None
+    proposed = raw.get("find_number")
+    refused = None if proposed is None else text_problem(proposed, LONGEST_FIND_NUMBER)
+    wrong_number = refused and f"entries[{index}].find_number: {refused}"
+    amount = quantity_of(1 if text else quantity or 0)
+    number = None if refused or proposed is None else proposed.strip() or None
+    entry = MergeRequestEntry(index, str(name).strip(), amount, components, number)
+    return entry, "; ".join(filter(None, (text, wrong, wrong_number))) or None
 
 
 def _components(index: int, raw: Any) -> tuple[Sequence[Mapping[str, str]], str | None]:
