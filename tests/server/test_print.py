@@ -7,8 +7,9 @@ import re
 from html import unescape
 
 import pytest
+import segno
 from fastapi.routing import APIRoute
-from server_testing import Api, bom
+from server_testing import Api, bom, form_body
 from web_visitor import Visitor
 
 from silo_server.run import RunningServer
@@ -157,3 +158,39 @@ def test_a_review_waits_for_those_who_may_approve(api: Api, visitors: dict[str, 
     api.good("POST", f"/api/items/{top}/releases/A/end", {"status": "rejected", "note": "no"})
     assert top not in visitors["viewer"].get("/waiting").body.decode()
     assert api.get(bom(top))[0]["quantity"] == 1
+
+
+def test_a_traveller_goes_through_the_workshop(
+    api: Api, server: RunningServer, product: tuple[str, str, str], visitors: dict[str, Visitor]
+) -> None:
+    """Position, quantity, material, remark and designators, the drawings, the code of the page; no cost."""
+    top, sub, screw = product
+    values = {"notes": "with Loctite 243", "reference_designators": ["S1", "S2"]}
+    api.good("PUT", bom(top, screw), values)
+    api.good("PATCH", f"/api/items/{screw}/properties", {"material": "Steel 8.8"})
+    body, headers = form_body({"file": (f"{sub}.pdf", b"%PDF-1.7\n%%EOF\n")})
+    api.good("POST", f"/api/items/{sub}/attachments", body=body, headers=headers)
+
+    def traveller(label: str) -> str:
+        path = f"/items/{top}/print?sheet=traveller&pieces=2{label}"
+        answer = visitors["viewer"].get(path)
+        assert answer.status == 200
+        return answer.body.decode()
+
+    draft = traveller("")
+    rows = {(row[2], row[5], row[6]): row for row in rows_of(draft) if len(row) > 8}
+    assert set(rows) == {(sub, "2", "4"), (screw, "99", "396"), (screw, "4", "8")}
+    of_screw = rows[screw, "4", "8"]
+    assert (of_screw[0], of_screw[4], of_screw[7]) == ("20", "Steel 8.8", "S1 S2with Loctite 243")
+    assert f"{sub}.pdf</a>" in draft
+    assert "DRAFT" in draft
+    frozen = traveller("&release=A")
+    assert (screw, "8", "32") in {(row[2], row[5], row[6]) for row in rows_of(frozen) if len(row) > 8}
+    assert "Loctite" not in frozen
+    assert f"{sub}.pdf</a>" not in frozen
+    for page in (draft, frozen):
+        assert "EUR" not in page
+        assert "0.12" not in page
+    address = f"{server.settings.public_url}/items/{top}"
+    for page, about in ((draft, address), (frozen, f"{address}/releases/A")):
+        assert segno.make_qr(about, error="m").svg_inline(scale=3, border=2, light="#fff") in page

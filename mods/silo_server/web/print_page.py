@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """A BOM on paper: all rows of a view on one page, of the draft or of a revision as it was frozen.
 
+The *cost sheet* has mass and cost. The *traveller* goes through the workshop with the product: no cost, but
+what a hand needs, and room to sign.
+
 Paper outlives the screen: whatever is not released says so in large letters on each sheet.
 """
 
@@ -9,9 +12,10 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query
+from markupsafe import Markup
 from starlette.responses import Response
 
 from silo.bom.errors import BusyError, ConflictError
@@ -19,10 +23,11 @@ from silo.bom.quantities import exact_product, exact_sum
 from silo_server.db.transaction import Tx
 from silo_server.errors import TooLargeError
 from silo_server.services import releases
+from silo_server.services.attachments import attachments_of
 from silo_server.services.items import get_item
 from silo_server.services.product.cost import bought_whole, prices_in, with_costs
 from silo_server.services.product.flat import flatten
-from silo_server.services.product.frozen import ProductContent, frozen_product
+from silo_server.services.product.frozen import ProductContent, frozen_files, frozen_product
 from silo_server.services.product.parts import RolledItem
 from silo_server.services.product.rollup import roll_up_cost
 from silo_server.services.product.summary import Summary
@@ -35,6 +40,7 @@ from silo_server.values import Item, Line
 from silo_server.web.accounts import Reader
 from silo_server.web.item_page import (
     AskedLook,
+    Branch,
     Look,
     ShownStructure,
     Totals,
@@ -44,12 +50,13 @@ from silo_server.web.item_page import (
     tree_page,
 )
 from silo_server.web.releases_page import STAMPS
-from silo_server.web.render import Address, page, segment
+from silo_server.web.render import Address, Page, page, segment
 
 router = APIRouter(include_in_schema=False)
 
 # Some 400 sheets of paper.
 MOST_PRINTED = 20_000
+DRAWING = "drawing"
 
 
 class FrozenStructure(ShownStructure):
@@ -81,23 +88,33 @@ def print_page(
     part_number: str,
     look: AskedLook,
     release: Annotated[str, Query(max_length=16)] = "",
+    sheet: Literal["", "traveller"] = "",
 ) -> Response:
     """Show the BOM for paper: all rows of the view on one page, with what a reader must know on top.
 
     ``release``: a revision as it was frozen. Raises NotFoundError if there is none with this label.
     """
+    traveller = sheet == "traveller"
+    if traveller:  # a line of a BOM has a number and a remark; a row of the flat list is of many lines
+        look = replace(look, view="tree", sort="")
     with call.server.large_reads.enter(), call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
         of = releases.get_release(tx, item, release) if release else None
         shown = structure_of_release(tx, item, of, look) if of else structure_of(tx, item, look, MOST_PRINTED)
+        if traveller:
+            shown["drawings"] = _drawings(tx, item, of, shown["table"])
         numbered = [one for one in releases.list_releases(tx, item) if one.status in releases.NUMBERED]
         approvals = releases.approvals_of(tx, of) if of else []
         draft, now = releases.coming_label(tx, item), tx.stamp
     path = f"/items/{segment(item.part_number)}"
     view = look.address(path)
+    asked = {"release": release, "sheet": sheet}
+    if traveller:
+        about = f"{path}/releases/{segment(of.label)}" if of else path
+        shown["code"] = _code(f"{call.server.settings.public_url or ''}{about}")
     return page(
         call,
-        "print.html",
+        "traveller.html" if traveller else "print.html",
         item=shown.pop("item", item),
         look=look,
         at=view,
@@ -106,10 +123,36 @@ def print_page(
         releases=numbered,
         draft=draft,
         stamp=STAMPS[of.status if of else ""],
-        here_at=Address(f"{path}/print", {**view.params, **({"release": release} if release else {})}),
+        here_at=Address(f"{path}/print", {**view.params, **{name: v for name, v in asked.items() if v}}),
         now=now,
         **shown,
     )
+
+
+def _code(address: str) -> Markup:
+    """Draw the QR code of a page's address."""
+    import segno  # for paper alone: a server starts without it
+
+    return Markup(segno.make_qr(address, error="m").svg_inline(scale=3, border=2, light="#fff"))
+
+
+def _drawings(tx: Tx, item: Item, of: Release | None, table: Page[Branch] | None) -> list[Mapping[str, Any]]:
+    """Find the drawings of a product and of what is in it, each as file name, revision and document."""
+    if of is not None:
+        return [one for one in frozen_files(tx, of.record)[1] if one["kind"] == DRAWING]
+    ids = {item.id, *(row.line.child_id for row in table.rows)} if table else {item.id}
+    found = [
+        {
+            "part_number": one.part_number,
+            "document": one.id,
+            "revision": one.revision_number,
+            "file_name": one.file_name,
+        }
+        for several in attachments_of(tx, ids).values()
+        for one in several
+        if one.kind == DRAWING
+    ]
+    return sorted(found, key=lambda one: (one["part_number"], one["file_name"]))
 
 
 def structure_of_release(tx: Tx, item: Item, of: Release, look: Look) -> dict[str, Any]:
