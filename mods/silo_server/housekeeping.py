@@ -43,8 +43,9 @@ from silo_server.errors import cause_of
 from silo_server.events import log
 from silo_server.services import items as item_service
 from silo_server.services.access.tokens import START_TOKEN
-from silo_server.services.bom.change import ChangeKind, LineRecord, history_row
+from silo_server.services.bom.change import history_row
 from silo_server.services.bom.history import state_at
+from silo_server.services.bom.line_record import ChangeKind, LineRecord
 from silo_server.services.file_store import FileStore
 from silo_server.times import stamp
 from silo_server.user_json import dumps

@@ -168,8 +168,8 @@ def test_a_traveller_goes_through_the_workshop(
     values = {"notes": "with Loctite 243", "reference_designators": ["S1", "S2"]}
     api.good("PUT", bom(top, screw), values)
     api.good("PATCH", f"/api/items/{screw}/properties", {"material": "Steel 8.8"})
-    body, headers = form_body({"file": (f"{sub}.pdf", b"%PDF-1.7\n%%EOF\n")})
-    api.good("POST", f"/api/items/{sub}/attachments", body=body, headers=headers)
+    body, headers = form_body({"kind": "drawing", "file": (f"{sub}.pdf", b"%PDF-1.7\n%%EOF\n")})
+    api.good("POST", f"/api/items/{sub}/files", body=body, headers=headers)
 
     def traveller(label: str) -> str:
         path = f"/items/{top}/print?sheet=traveller&pieces=2{label}"
@@ -182,12 +182,12 @@ def test_a_traveller_goes_through_the_workshop(
     assert set(rows) == {(sub, "2", "4"), (screw, "99", "396"), (screw, "4", "8")}
     of_screw = rows[screw, "4", "8"]
     assert (of_screw[0], of_screw[4], of_screw[7]) == ("20", "Steel 8.8", "S1 S2with Loctite 243")
-    assert f"{sub}.pdf</a>" in draft
+    assert f"{sub}.pdf</bdi></a>" in draft
     assert "DRAFT" in draft
     frozen = traveller("&release=A")
     assert (screw, "8", "32") in {(row[2], row[5], row[6]) for row in rows_of(frozen) if len(row) > 8}
     assert "Loctite" not in frozen
-    assert f"{sub}.pdf</a>" not in frozen
+    assert f"{sub}.pdf</bdi></a>" not in frozen
     for page in (draft, frozen):
         assert "EUR" not in page
         assert "0.12" not in page

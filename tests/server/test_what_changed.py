@@ -83,7 +83,7 @@ def test_a_note_is_a_change_of_the_line(api: Api, product: tuple[str, ...]) -> N
     api.good("PUT", bom(sub, part), {"notes": "glued", "find_number": "7"})
     (row,) = changes(api, top, since)
     assert row[0] == "line"
-    assert (row[3], row[4]) == ("find number: –; notes: –", "find number: 7; notes: glued")
+    assert (row[3], row[4]) == ("find number: 10; notes: –", "find number: 7; notes: glued")
 
 
 def test_revisions_are_moments_and_what_is_none_is_refused(api: Api, product: tuple[str, ...]) -> None:

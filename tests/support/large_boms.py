@@ -13,7 +13,8 @@ from typing import Any
 from server_testing import Api
 
 from silo_server.db.database import Database
-from silo_server.services.bom.change import ChangeKind, ChangeNote, LineRecord, apply_changes, new_line_id
+from silo_server.services.bom.change import ChangeNote, apply_changes, new_line_id
+from silo_server.services.bom.line_record import ChangeKind, LineRecord
 from silo_server.services.items import NewItem, create_item, get_item
 from silo_server.settings import Settings
 from silo_server.values import LineState

@@ -24,10 +24,10 @@ from silo.bom.units import counts_pieces
 from silo_server.db.transaction import Tx
 from silo_server.schema import text_hints
 from silo_server.services.bom import history
-from silo_server.services.bom.change import ChangeKind
 from silo_server.services.bom.conflicts import last_cad_quantities
 from silo_server.services.bom.decisions import Decision, ReviewAction
 from silo_server.services.bom.history import Change, ChangedLine
+from silo_server.services.bom.line_record import ChangeKind
 from silo_server.services.bom.review import Review
 from silo_server.values import Item, Line, LineState
 from silo_server.web.forms import Edit, amount, compared, same_text, text, texts, whole

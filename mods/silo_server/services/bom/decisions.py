@@ -17,15 +17,10 @@ from silo.bom.units import counts_pieces
 from silo_server.db.tables import bom_conflicts
 from silo_server.db.transaction import Tx
 from silo_server.errors import LinesChangedError
-from silo_server.services.bom.change import (
-    ChangeKind,
-    ChangeNote,
-    LineRecord,
-    apply_changes,
-    parent_to_change,
-)
+from silo_server.services.bom.change import ChangeNote, apply_changes, parent_to_change
 from silo_server.services.bom.conflicts import CadQuantity, Conflict, open_conflicts
 from silo_server.services.bom.line_edit import owned_by_users
+from silo_server.services.bom.line_record import ChangeKind, LineRecord
 from silo_server.services.bom.lines import LineId, component_of, lines_of
 from silo_server.services.bom.review import marks_of, review
 from silo_server.services.bom.waiting import conflicts_mark

@@ -19,9 +19,7 @@ from silo_server.db.rows import newest_first, one_of
 from silo_server.db.tables import bom_change_lines, bom_changes, items
 from silo_server.db.transaction import Tx
 from silo_server.fields import from_row
-from silo_server.services.bom.change import (
-    ChangeKind,
-)
+from silo_server.services.bom.line_record import ChangeKind
 from silo_server.services.bom.line_state import stored_state
 from silo_server.values import Item, LineState
 

@@ -30,9 +30,7 @@ from silo_server.db.tables import items
 from silo_server.db.transaction import Tx
 from silo_server.schema import find_schema
 from silo_server.services.bom.change import (
-    ChangeKind,
     ChangeNote,
-    LineRecord,
     apply_changes,
     check_version,
     locked_parent,
@@ -42,6 +40,7 @@ from silo_server.services.bom.cycles import check_no_cycle, find_rings
 from silo_server.services.bom.import_parts import IdentifiedRow, identified, new_item
 from silo_server.services.bom.import_plan import NOTHING, Allowed, ImportPlan, ImportRow, MissingLine
 from silo_server.services.bom.line_edit import check_state, edited_state, means_the_same_unit
+from silo_server.services.bom.line_record import ChangeKind, LineRecord
 from silo_server.services.bom.lines import lines_of_many
 from silo_server.services.import_file import read_import
 from silo_server.services.items import by_ids, create_item, get_item

@@ -15,15 +15,9 @@ from silo.bom.units import PIECES, counts_pieces, line_unit, stored_unit
 from silo_server.db.transaction import Tx
 from silo_server.errors import DuplicateError, LinesChangedError
 from silo_server.schema import text_hints
-from silo_server.services.bom.change import (
-    ChangeKind,
-    ChangeNote,
-    LineRecord,
-    apply_changes,
-    new_line_id,
-    parent_to_change,
-)
+from silo_server.services.bom.change import ChangeNote, apply_changes, new_line_id, parent_to_change
 from silo_server.services.bom.cycles import check_no_cycle
+from silo_server.services.bom.line_record import ChangeKind, LineRecord
 from silo_server.services.bom.line_state import mark_of
 from silo_server.services.bom.lines import LineId, line_of, lines_of
 from silo_server.services.field_checks import quantity_problem

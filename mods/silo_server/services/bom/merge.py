@@ -28,9 +28,7 @@ from silo_server.db.transaction import Tx
 from silo_server.events import announce
 from silo_server.fields import names_of
 from silo_server.services.bom.change import (
-    ChangeKind,
     ChangeNote,
-    LineRecord,
     apply_changes,
     check_version,
     locked_parent,
@@ -38,6 +36,7 @@ from silo_server.services.bom.change import (
 )
 from silo_server.services.bom.cycles import check_no_cycle
 from silo_server.services.bom.last_sync import LastSync, last_sync, record_merge
+from silo_server.services.bom.line_record import ChangeKind, LineRecord
 from silo_server.services.bom.lines import lines_of
 from silo_server.services.bom.merge_repeat import rebuilt, without_unchanged
 from silo_server.services.bom.merge_request import MergeRequestIn

@@ -14,8 +14,8 @@ from typing import Any
 from silo.bom.quantities import plain
 from silo_server.db.answers import KeptAnswer
 from silo_server.db.transaction import Tx
-from silo_server.services.bom.change import LineRecord
 from silo_server.services.bom.history import state_at
+from silo_server.services.bom.line_record import LineRecord
 from silo_server.user_json import dumps
 from silo_server.values import Item, Line, LineState
 

@@ -10,15 +10,10 @@ from silo_server.db.rows import one_of
 from silo_server.db.tables import bom_conflicts
 from silo_server.db.transaction import Tx
 from silo_server.errors import ArchivedPartsError
-from silo_server.services.bom.change import (
-    ChangeKind,
-    ChangeNote,
-    LineRecord,
-    apply_changes,
-    parent_to_change,
-)
+from silo_server.services.bom.change import ChangeNote, apply_changes, parent_to_change
 from silo_server.services.bom.cycles import check_no_cycle
 from silo_server.services.bom.history import Change, get_change, state_at
+from silo_server.services.bom.line_record import ChangeKind, LineRecord
 from silo_server.services.bom.lines import lines_of
 from silo_server.values import Item, Line
 
