@@ -14,10 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from server_testing import Api, wait_until
+from server_testing import Api, sqlite_database, wait_until
 from web_visitor import enter
 
 from silo.api.config import config_path, load_config
+from silo_server.run import running_server
+from silo_server.settings import Settings
 
 
 def test_the_server_and_the_token_are_kept_for_this_user(
@@ -33,6 +35,23 @@ def test_the_server_and_the_token_are_kept_for_this_user(
     assert silo.token not in ran.out
     assert config_path().stat().st_mode & 0o077 == 0
     assert run("doctor").code == 0
+
+
+@pytest.mark.parametrize("written", ["/silo", "/silo/", "/silo/api"])
+def test_a_server_below_a_base_path_is_found_by_the_address_of_its_pages(
+    run: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, written: str
+) -> None:
+    """``https://host/silo`` is what the browser shows; the API is below it."""
+    for name in ("SILO_API_URL", "SILO_API_TOKEN"):
+        monkeypatch.delenv(name, raising=False)
+    url, token = sqlite_database(tmp_path / "below.db"), "silo_" + "d4" * 20
+    settings = Settings(database_url=url, root_path="/silo")
+    with running_server(url, token=token, settings=settings) as server:
+        host = server.base_url.removesuffix("/silo")
+        ran = run("login", f"{host}{written}", "--token", token)
+        assert (ran.code, ran.err) == (0, "")
+        assert f"{host}/silo/api" in str(load_config(config_path()))
+        assert run("whoami").code == 0
 
 
 @pytest.mark.usefixtures("needs_pty", "needs_signals")

@@ -13,7 +13,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from silo import caption, spoken
-from silo.bom.errors import AuthError, Exit, InputError
+from silo.bom.errors import AuthError, Exit, InputError, RouteMissingError, SiloError
 from silo.bom.message import message
 from silo.cli.connection import account_of, client_of
 from silo.cli.json_output import print_json
@@ -93,6 +93,7 @@ def run_login(args: argparse.Namespace) -> int:
     from silo.api.config import config_path, resolve_server, save_config
     from silo.outbox.store import Store
 
+    args.url = _where_the_api_is(args.url, args.ca)
     token = args.token or _token_by_browser(args) or _token(args.url)
     where = resolve_server(args.url, token, args.ca, env={}, path=config_path())
     with SiloClient(where.url, where.token, verify=where.verify) as client:
@@ -117,6 +118,31 @@ def run_login(args: argparse.Namespace) -> int:
             )
         )
     return Exit.DONE
+
+
+def _where_the_api_is(url: str, ca: str | None) -> str:
+    """Return the address with ``/api`` behind its path, if the API is there and not at the address itself.
+
+    Users copy the address of the pages; below a base path (``https://host/silo``) the API is elsewhere.
+    """
+    from silo.api.address import ServerAddress
+    from silo.api.client import SiloClient
+    from silo.api.config import config_path, resolve_server
+
+    where = resolve_server(url, None, ca, env={}, path=config_path())
+    address = ServerAddress.parse(where.url)
+    if address.api_root.endswith("/api"):
+        return url
+    for path in ("", "/api"):
+        with SiloClient(address.api_root + path, None, verify=where.verify) as client:
+            try:
+                client.whoami()
+            except RouteMissingError:
+                continue
+            except SiloError:  # it wants a token, or does not answer: the log-in says it
+                pass
+            return url if not path else address.api_root + path
+    return url
 
 
 def _token_by_browser(args: argparse.Namespace) -> str:
