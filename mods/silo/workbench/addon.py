@@ -259,8 +259,8 @@ class AddOn:
     def _draw_signs(self, shown: PaneState) -> None:
         """Draw the signs in status bar and tree that something needs an answer."""
         if self._signs is None:
-            from silo.workbench.gui.status_sign import StatusSign
             from silo.workbench.gui.tree_sign import TreeSign
+            from silo.workbench.pane.status_sign import StatusSign
 
             window = host.main_window()
             self._signs = StatusSign(window, self.dock.show_and_raise), TreeSign(window)

@@ -12,6 +12,23 @@ from silo.workbench.session.state import PaneState
 from silo.workbench.tone import Tone
 from silo.workbench.words import counted, translate
 
+# [lines] of a tool tip, at most
+_MOST = 12
+
+
+def sign_text(shown: PaneState) -> str:
+    """Say what needs an answer, shortly; "" if nothing does."""
+    other = sum(kind == "commit" for kind, _key in shown.questions())
+    texts = [
+        counted(n, one, many)
+        for n, one, many in (
+            (len(shown.held), translate("Silo", "{n} BOM held"), translate("Silo", "{n} BOMs held")),
+            (other, translate("Silo", "{n} commit asks"), translate("Silo", "{n} commits ask")),
+        )
+        if n
+    ]
+    return f"Silo: {', '.join(texts)}" if texts else ""
+
 
 class StatusSign(QtWidgets.QToolButton):  # type: ignore[misc]  # PySide has no types
     """One in the window's status bar; hidden while nothing needs an answer."""
@@ -32,20 +49,3 @@ class StatusSign(QtWidgets.QToolButton):  # type: ignore[misc]  # PySide has no 
         self.setToolTip("\n".join(held.sentence for held in shown.held[:_MOST]))
         self.setStyleSheet(f"QToolButton {{ color: {widgets.colour(Tone.ERROR, self)}; }}")
         self.setVisible(bool(text))
-
-
-_MOST = 12
-
-
-def sign_text(shown: PaneState) -> str:
-    """Say what needs an answer, shortly; "" if nothing does."""
-    other = sum(kind == "commit" for kind, _key in shown.questions())
-    texts = [
-        counted(n, one, many)
-        for n, one, many in (
-            (len(shown.held), translate("Silo", "{n} BOM held"), translate("Silo", "{n} BOMs held")),
-            (other, translate("Silo", "{n} commit asks"), translate("Silo", "{n} commits ask")),
-        )
-        if n
-    ]
-    return f"Silo: {', '.join(texts)}" if texts else ""
