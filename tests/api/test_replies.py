@@ -193,3 +193,11 @@ def test_an_empty_list_may_be_null() -> None:
     assert reply(200, {"bom": None}).models(BomLine, "bom") == []
     with pytest.raises(ServerFaultError, match="no list"):
         reply(200, {"other": []}).models(BomLine, "bom")
+
+
+@pytest.mark.parametrize(("named", "said"), [("30", "in 30 s"), ("2301782400", "in 60 min")])
+def test_a_pause_is_said_as_long_as_it_is_kept(named: str, said: str) -> None:
+    """A server that names 26641 days is asked again after an hour, and the words say so."""
+    head = {"Content-Type": "application/json", "Retry-After": named}
+    answer = Reply(429, b"{}", WHERE, head, None)
+    assert said in str(error_of(answer))

@@ -20,6 +20,7 @@ from urllib.parse import parse_qsl, urlsplit
 from pydantic import BaseModel, TypeAdapter
 
 from silo.api.foreign import Where, translated
+from silo.api.pause import LONGEST_TOLD
 from silo.bom.errors import (
     AuthError,
     BusyError,
@@ -284,7 +285,9 @@ def error_of(reply: Reply, *, writing: bool = False) -> SiloError:
         closed.named = _names_read_only(reported)
         return _put_off(closed, later)
     if status == 429 or (status == 503 and later is not None):
-        when = message("in {later}", later=duration(later)) if later is not None else "later"
+        # The same time as that of the pause: a server that names years is asked again after an hour.
+        soon = None if later is None else min(later, LONGEST_TOLD)
+        when = message("in {later}", later=duration(soon)) if soon is not None else "later"
         return _put_off(
             BusyError(
                 message(

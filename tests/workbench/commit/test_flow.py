@@ -17,7 +17,7 @@ from silo.outbox.store import Store
 from silo.project_folder import Project
 from silo.registering.journal import Journal
 from silo.registering.request import RegistrationRequest
-from silo.workbench.activity.box import Do
+from silo.workbench.activity.box import Action, Do, EntryLine, PaneEntry
 from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.register.flow import RegisterFlow
 
@@ -286,3 +286,14 @@ def test_a_bom_names_the_files_content_where_the_document_is_as_saved(
     doc.changed = False
     office.desk.documents.base(doc).stamp = (0, 0, 0)  # type: ignore[assignment]
     assert (*told, named()) == (True, True, False, False)
+
+
+def test_two_files_that_are_one_part_hide_no_question_about_a_third(office: Office, flow: CommitFlow) -> None:
+    """The box about all three still asks; the box about the two does not."""
+    for key, files in (("two", ("a", "b")), ("three", ("a", "b", "c"))):
+        ask = Action(Do.SAME, "Same part", "ID", "Top", files)
+        line = EntryLine("one identity", actions=(ask,))
+        office.session.add(PaneEntry(key, key, 1.0, lines=(line,), rank=1))
+    flow.accept("id", ("a", "b"))
+    asks = {entry.key: bool(entry.lines[0].actions) for entry in office.session.shown.activity.entries}
+    assert asks == {"two": False, "three": True}
