@@ -165,6 +165,21 @@ def test_names_stay(german: None) -> None:
         assert said == f"Die Datei {name}.FCStd fehlt; verwendet von {name}, {name} 2."
 
 
+def test_names_that_look_like_our_sentences_stay(german: None) -> None:
+    """In a finding, and in the suggestion behind it."""
+    for name in (
+        "used by b",
+        "same part",
+        "The file A is missing; used by B. Did you mean C",
+        "{file}",
+        "%s",
+    ):
+        code = FindingCode.MISSING_FILE
+        values = {"text": Message(code.sentence, {"file": name}), "tail": Message(code.tail, {"users": name})}
+        said = spoken(Message("{text}; {tail}.", values))
+        assert said == f"Die Datei {name} fehlt; verwendet von {name}."
+
+
 def test_each_finding_is_german(german: None) -> None:
     for code in FindingCode:
         assert spoken(code.meaning) != code.meaning

@@ -100,7 +100,8 @@ def duration(seconds: float) -> str:
 
 def listed(names: Sequence[str], most: int = 5) -> str:
     """List the first ``most`` names, and how many more there are: a, b and 3 more."""
-    first = joined(", ", names[:most])
+    is_plain = not any(isinstance(name, Message) for name in names)
+    first = ", ".join(names[:most]) if is_plain else joined(", ", names[:most])
     return message("{names} and {n} more", names=first, n=len(names) - most) if len(names) > most else first
 
 

@@ -21,6 +21,25 @@ from types import MappingProxyType
 from typing import Any, Protocol, Self
 
 _PLACE = re.compile(r"\{(\w+)\}")
+# Values that never hold a sentence of ours; all others may, until no plain sentence is left.
+_NAMES = frozenset(
+    [
+        "file",
+        "path",
+        "part",
+        "name",
+        "names",
+        "users",
+        "obj",
+        "target",
+        "label",
+        "document",
+        "place",
+        "number",
+        "part_number",
+        "by",
+    ]
+)
 
 
 class Catalogue(Protocol):
@@ -77,7 +96,11 @@ class Message(str):
             text = catalogue.ngettext(self.template, self.plural, self.values["n"])
         else:
             text = catalogue.gettext(self.template) if self.template else ""
-        return filled(text, {name: said(value, catalogue) for name, value in self.values.items()})
+        shown = {
+            name: value if name in _NAMES and not isinstance(value, Message) else said(value, catalogue)
+            for name, value in self.values.items()
+        }
+        return filled(text, shown)
 
     def as_json(self) -> dict[str, Any]:
         """Return template and values for JSON; values are messages, whole numbers or text."""
