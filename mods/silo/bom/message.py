@@ -23,22 +23,7 @@ from typing import Any, Protocol, Self
 _PLACE = re.compile(r"\{(\w+)\}")
 # Values that never hold a sentence of ours; all others may, until no plain sentence is left.
 _NAMES = frozenset(
-    [
-        "file",
-        "path",
-        "part",
-        "name",
-        "names",
-        "users",
-        "obj",
-        "target",
-        "label",
-        "document",
-        "place",
-        "number",
-        "part_number",
-        "by",
-    ]
+    ("file", "path", "part", "name", "names", "users", "obj", "target", "label", "document", "place")
 )
 
 
