@@ -726,26 +726,6 @@ Commits that are not copied by then may have to be committed again.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../gui/status_sign.py" />
-            <source>{n} BOM held</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../gui/status_sign.py" />
-            <source>{n} BOMs held</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../gui/status_sign.py" />
-            <source>{n} commit asks</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../gui/status_sign.py" />
-            <source>{n} commits ask</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
             <location filename="../../gui/widgets.py" />
             <location filename="../../mass/dialog.py" />
             <location filename="../../preview/dialog.py" />
@@ -990,6 +970,26 @@ Commits that are not copied by then may have to be committed again.</source>
             <location filename="../../pane/dock.py" />
             <location filename="../../settings/install.py" />
             <source>Database Activity</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/status_sign.py" />
+            <source>{n} BOM held</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/status_sign.py" />
+            <source>{n} BOMs held</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/status_sign.py" />
+            <source>{n} commit asks</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/status_sign.py" />
+            <source>{n} commits ask</source>
             <translation type="unfinished" />
         </message>
         <message>

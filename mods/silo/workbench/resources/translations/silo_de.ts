@@ -727,26 +727,6 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
             <translation>Schließen, ohne zu warten</translation>
         </message>
         <message>
-            <location filename="../../gui/status_sign.py" />
-            <source>{n} BOM held</source>
-            <translation>{n} Stückliste zurückgehalten</translation>
-        </message>
-        <message>
-            <location filename="../../gui/status_sign.py" />
-            <source>{n} BOMs held</source>
-            <translation>{n} Stücklisten zurückgehalten</translation>
-        </message>
-        <message>
-            <location filename="../../gui/status_sign.py" />
-            <source>{n} commit asks</source>
-            <translation>{n} Commit fragt</translation>
-        </message>
-        <message>
-            <location filename="../../gui/status_sign.py" />
-            <source>{n} commits ask</source>
-            <translation>{n} Commits fragen</translation>
-        </message>
-        <message>
             <location filename="../../gui/widgets.py" />
             <location filename="../../mass/dialog.py" />
             <location filename="../../preview/dialog.py" />
@@ -992,6 +972,26 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
             <location filename="../../settings/install.py" />
             <source>Database Activity</source>
             <translation>Datenbank-Aktivität</translation>
+        </message>
+        <message>
+            <location filename="../../pane/status_sign.py" />
+            <source>{n} BOM held</source>
+            <translation>{n} Stückliste zurückgehalten</translation>
+        </message>
+        <message>
+            <location filename="../../pane/status_sign.py" />
+            <source>{n} BOMs held</source>
+            <translation>{n} Stücklisten zurückgehalten</translation>
+        </message>
+        <message>
+            <location filename="../../pane/status_sign.py" />
+            <source>{n} commit asks</source>
+            <translation>{n} Commit fragt</translation>
+        </message>
+        <message>
+            <location filename="../../pane/status_sign.py" />
+            <source>{n} commits ask</source>
+            <translation>{n} Commits fragen</translation>
         </message>
         <message>
             <location filename="../../pane/waiting.py" />
