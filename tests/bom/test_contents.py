@@ -533,3 +533,16 @@ def test_a_missing_component_is_counted_like_any_other(
     assert {entry.key: entry.quantity for entry in found.entries} == lines
     assert all(entry.missing and not entry.consolidation_warning for entry in found.entries)
     assert found.blocked == (code is not FindingCode.UNSET_LINK)
+
+
+@pytest.mark.parametrize(
+    ("values", "proposed"),
+    [(("", "20"), "20"), (("5a", "20"), "5a"), ((30, None), "30"), ((True, 0), ""), ((None, " 7 "), "7")],
+)
+def test_a_link_may_propose_a_find_number(
+    top: Doc, bolt: Any, values: tuple[Any, Any], proposed: str
+) -> None:
+    """``SiloFindNumber``, a text or a whole number; of several links of a part the first that has it."""
+    links = [top.link(f"L{n}", bolt, SiloFindNumber=value) for n, value in enumerate(values)]
+    (entry,) = extract(top.assembly(*links)).entries
+    assert (entry.quantity, entry.find_number) == (2, proposed)

@@ -12,13 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo import bom_sync
-from silo.api.wire import MergeRequest, MergeResult
+from silo.api.wire import LastSync, MergeRequest, MergeResult
 from silo.bom.compare.merge import apply_merge, plan_merge
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import UnreachableError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom_sync.resolved import blocking
-from silo.bom_sync.steps import Status
+from silo.bom_sync.steps import Status, merge_request
 
 
 @dataclass
@@ -242,3 +242,16 @@ def test_a_line_that_is_kept_for_a_missing_file_is_no_news() -> None:
     assert not synced(there, missing, lines=[line], at="2026-01-01T00:00:00Z")
     gone = [{**line, "components": [{"file": "other.FCStd", "object": "Body"}]}]
     assert synced(there, lines=gone, at="2026-01-01T00:00:00Z")
+
+
+def test_a_proposed_find_number_goes_to_a_server_that_knows_it() -> None:
+    """A server that remembers its syncs gives them; any other gets exactly the request of the spec."""
+    silo = silo_of("top", "bolt", "gearbox", "gear")
+    extraction = tree()
+    bolt, gearbox = extraction.entries
+    resolved = bom_sync.resolve(replace(extraction, entries=(replace(bolt, find_number="20"), gearbox)), silo)
+    remembering = replace(resolved, last_syncs={"u-top": LastSync()})
+    numbers = [
+        [entry.find_number for entry in merge_request(each, "s1").entries] for each in (remembering, resolved)
+    ]
+    assert numbers == [["20", None], [None, None]]

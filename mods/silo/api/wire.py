@@ -316,7 +316,7 @@ class MergeEntry(Wire):
     quantity: Quantity
     source: str = "assembly"
     components: list[Component] | None = None
-    find_number: Annotated[str | None, Field(max_length=32)] = None
+    find_number: str | None = None
 
 
 class LeftOutPart(Wire):

@@ -63,6 +63,8 @@ class BomEntry:
         (file, object) of the configured copy.
     is_own_item
         True for a variant with an identity of its own; any other is counted under its original's number.
+    find_number
+        what the first of its links proposes (``SiloFindNumber``); the server gives the number. "" for none.
     """
 
     doc_path: str
@@ -88,6 +90,7 @@ class BomEntry:
 
     variant: str = ""
     copy: tuple[str, str] = field(default=("", ""), compare=False, repr=False)
+    find_number: str = field(default="", compare=False, repr=False)
     is_own_item: bool = field(default=False, compare=False)
 
     def __post_init__(self) -> None:

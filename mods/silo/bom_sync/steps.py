@@ -167,6 +167,7 @@ def merge_request(resolved: Resolved, sync_id: str, document: SourceDocument | N
             components=[Component(**component) for component in components_of(entry, resolved.folder)]
             if remembers
             else None,
+            find_number=(entry.find_number or None) if remembers else None,
         )
         for entry in resolved.entries
         if entry.part_number is not None

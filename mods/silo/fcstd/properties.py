@@ -52,7 +52,8 @@ _KEPT = frozenset(
     {
         *("Base", "Count", "ElementCount", "ElementList", "Group", "Label", "LinkCopyOnChange"),
         *("LinkCopyOnChangeSource", "LinkedObject", "Meta", "Scale", "ScaleList", "ScaleVector"),
-        *("Visibility", "SiloBomExclude", "SiloItemId", "SiloUUID", "Suppressed", "Type"),
+        *("Visibility", "SiloBomExclude", "SiloFindNumber", "SiloItemId", "SiloUUID", "Suppressed"),
+        "Type",
     }
 )
 

@@ -104,6 +104,7 @@ def merge_lines(entries: Iterable[BomEntry]) -> list[BomEntry]:
             individual_links=before.individual_links + entry.individual_links,
             link_objects=before.link_objects + entry.link_objects,
             instances=before.instances + entry.instances,
+            find_number=before.find_number or entry.find_number,
         )
     return list(lines.values())
 

@@ -45,7 +45,8 @@ class ObjectLike(Protocol):
     Optional: ``Name``, ``Label``, ``TypeId``, ``PropertiesList``, ``Group``, ``LinkedObject`` (an object,
     None, or a tuple ``(object, sub_name)``), ``ElementCount``, ``ElementList``, ``Visibility``,
     ``ScaleVector``, ``ScaleList``, ``LinkCopyOnChangeSource``, ``Suppressed``, ``SiloBomExclude``,
-    ``SiloItemId``, ``SiloUUID``, ``LinkProblem`` (ours, below), and for Draft arrays ``Base`` and ``Count``.
+    ``SiloFindNumber``, ``SiloItemId``, ``SiloUUID``, ``LinkProblem`` (ours, below), and for Draft arrays
+    ``Base`` and ``Count``.
     ``own_property(name, default)`` answers :func:`own` where an object knows its own properties at once.
     """
 

@@ -456,6 +456,7 @@ class _Walker:
             "individual_links": sum([not link.array for link in links]),
             "link_objects": len(links),
             "instances": tuple([count.shown.key[1] for count in counts]),
+            "find_number": next(filter(None, map(_proposed, counts)), ""),
             **more,
         }
         return BomEntry(**(vars(entry) | values))  # dataclasses.replace() takes twice as long
@@ -549,3 +550,9 @@ def strongly_connected(graph: Graph) -> list[frozenset[Key]]:
 
 
 __all__ = ["Extraction", "Finding", "FindingCode", "Place", "extract", "extract_bom_links"]
+
+
+def _proposed(count: Count) -> str:
+    """Return the find number that a counted link proposes; "" for none."""
+    value = own(count.shown.obj, "SiloFindNumber")
+    return str(value).strip() if isinstance(value, str | int) and value is not True and value else ""
