@@ -14,13 +14,8 @@ from sqlalchemy import select, update
 from silo.bom.units import Unit, unit_of
 from silo_server.db.tables import bom_lines, items, orders
 from silo_server.db.transaction import Tx
-from silo_server.services.bom.change import (
-    ChangeKind,
-    ChangeNote,
-    LineRecord,
-    apply_changes,
-    locked_parent,
-)
+from silo_server.services.bom.change import ChangeNote, apply_changes, locked_parent
+from silo_server.services.bom.line_record import ChangeKind, LineRecord
 from silo_server.services.bom.lines import lines_of
 from silo_server.services.items import ItemChange, change_item, get_item
 from silo_server.values import Item
