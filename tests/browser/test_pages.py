@@ -346,3 +346,14 @@ def test_names_are_shown_as_text(api: Api, visit: Visit) -> None:
     expect(page.locator("#found")).to_contain_text("2 items")
     expect(page.locator("#shown")).to_contain_text(HOSTILE)
     assert page.locator("img[src=x]").count() == 0
+
+
+def test_a_slash_goes_to_the_search(visit: Visit) -> None:
+    """From anywhere on the page; while somebody types, it is a slash."""
+    page = visit("viewer")
+    page.goto("/items")
+    page.keyboard.press("/")
+    field = page.get_by_role("searchbox")
+    expect(field).to_be_focused()
+    page.keyboard.type("a/b")
+    expect(field).to_have_value("a/b")

@@ -23,6 +23,16 @@ if (!document.cookie.split("; ").includes(cookie)) {
   });
 }
 
+// "/" goes to the search of the page, as on many pages of others; never while somebody types.
+document.addEventListener("keydown", (event) => {
+  const typing = event.target.closest?.("input, select, textarea, [contenteditable]");
+  const field = document.querySelector('input[type="search"]');
+  if (event.key !== "/" || event.ctrlKey || event.metaKey || event.altKey || typing || !field) return;
+  event.preventDefault();
+  field.focus();
+  field.select();
+});
+
 const PATIENCE = 10000; // so long a form that was sent waits for its answer
 let sent = null;
 let given_up = null;
