@@ -42,7 +42,13 @@ from sqlalchemy import (
 from sqlalchemy.exc import SQLAlchemyError
 
 from silo.bom.errors import ConfigError, SiloError, listed
-from silo.platform.whole_files import replace_patiently, replacing, scratch_folder, sync_folder
+from silo.platform.whole_files import (
+    nearest_folder,
+    replace_patiently,
+    replacing,
+    scratch_folder,
+    sync_folder,
+)
 from silo_server.actors import SYSTEM
 from silo_server.db.database import Database
 from silo_server.db.migrate import STEPS, check_revision, upgrade
@@ -71,6 +77,10 @@ from silo_server.user_json import dumps
 FORMAT = 1
 # When the last backup was made, and where; for the page of the system.
 BACKED_UP = "backed_up"
+# When a backup was last restored to see that it can be, and which.
+RESTORE_TRIED = "restore_tried"
+# Tables that a restore changes itself: it logs everybody out, and notes that it was done.
+_ALTERED = frozenset({"sessions", "login_links", "login_attempts", "events", "audit", "server_state"})
 PAGE = 5000
 CHUNK = 1024 * 1024
 # A restored server gives its events ids that none had before, so that every listener, even one that saw more
@@ -132,7 +142,9 @@ def back_up(settings: Settings, target: Path, report: Report = lambda _: None) -
             _open(settings) as db,
             db.write(even_when_read_only=True) as tx,
         ):
-            put_state(tx, BACKED_UP, dumps({"at": made.made_at, "target": str(target)}))
+            same = target.stat().st_dev == nearest_folder(settings.storage).stat().st_dev
+            made_here = {"at": made.made_at, "target": str(target), "same_disk": same}
+            put_state(tx, BACKED_UP, dumps(made_here))
     except OSError as error:
         raise ConfigError(f"backup: {target} cannot be written: {error.strerror or error}") from error
     return made
@@ -221,6 +233,43 @@ def restore(
         raise ConfigError(
             f"restore: {settings.storage} cannot be written: {error.strerror or error}"
         ) from error
+    return made
+
+
+def try_restore(settings: Settings, source: Path, report: Report = lambda _: None) -> Manifest:
+    """Restore a backup into a scratch folder beside it, compare each table, and note the day at the server.
+
+    The server's own state stays as it is. Raises ConfigError if the backup cannot be restored, or if rows or
+    files of it are not there afterwards.
+    """
+    try:
+        with scratch_folder(".restore-test-", source.parent) as name:
+            folder = Path(name)
+            beside = Settings(database_url=f"sqlite:///{folder / 'silo.db'}", files_dir=folder / "files")
+            made = restore(beside, source, report=report)
+            with _open(beside) as db, db.read() as tx:
+                there = inspect(tx.conn).get_table_names()
+                wrong = [
+                    table_name
+                    for table_name, rows in made.rows.items()
+                    if made.schema == max(STEPS)
+                    and table_name not in _ALTERED
+                    and (
+                        table_name not in there
+                        or tx.conn.scalar(select(func.count()).select_from(table(table_name))) != rows
+                    )
+                ]
+            store = FileStore(beside.storage)
+            kept = _checksums(folder / "silo.db") - {*made.missing_files}
+            wrong += [checksum for checksum in sorted(kept) if not store.holds(checksum)]
+    except OSError as error:
+        raise ConfigError(
+            f"restore: no test beside {source}, for that folder cannot be written: {error.strerror or error}"
+        ) from error
+    if wrong:
+        raise ConfigError(f"restore: after a test restore of {source} these differ: {listed(wrong)}")
+    with _open(settings) as db, db.write(even_when_read_only=True) as tx:
+        put_state(tx, RESTORE_TRIED, dumps({"at": tx.stamp, "made_at": made.made_at, "source": str(source)}))
     return made
 
 

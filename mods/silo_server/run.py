@@ -37,7 +37,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from silo.bom.errors import ConfigError
 from silo.platform.limits import allow_many_files
 from silo.platform.sockets import WORKERS_CAN_SHARE_A_SOCKET, own_the_port
-from silo.platform.whole_files import scratch_folder
+from silo.platform.whole_files import nearest_folder, scratch_folder
 from silo_server.actors import Role
 from silo_server.backup import back_up_before_upgrade
 from silo_server.db.database import WRITERS_WAITING, Database
@@ -222,7 +222,7 @@ def create_app(settings: Settings, clock: Clock = utc_now) -> FastAPI:
     app = FastAPI(
         title="silo-mod server",
         version=importlib.metadata.version("silo-mod"),
-        openapi_url="/api/openapi.json",
+        openapi_url=None,  # a route of our own may ask for a login
         docs_url=None,
         redoc_url=None,
         lifespan=lifespan,
@@ -305,7 +305,9 @@ class Greeting:
         if self.login_url is None:
             lines.append("There is no active admin. Start again with --reset-admin NAME to make one.")
         if self.public:
-            warning = "This server can be reached from other machines. Put TLS before it (docs/server.md)."
+            warning = (
+                "This server can be reached from other machines. Put TLS before it (docs/install-server.md)."
+            )
             lines.append(warning)
         return [*lines, *(f"Warning:     {warning}" for warning in self.warnings)]
 
@@ -420,7 +422,7 @@ def serve(
     shown = welcome.token
     if shown and given:
         shown = f"{shown_prefix(given)}… (the one you gave)"
-    free = shutil.disk_usage(_nearest(own.storage)).free
+    free = shutil.disk_usage(nearest_folder(own.storage)).free
     warnings = [*start_warnings(own, is_loopback(host), free), *welcome.warnings]
     settings = replace(settings, warnings=tuple(warnings))
     greeting = Greeting(base_url, shown, login_url, database, not is_loopback(host), warnings)
@@ -459,12 +461,6 @@ def start_warnings(settings: Settings, loopback: bool, free: int) -> list[str]:
         < 1024 * MIB,
     }
     return [warning for warning, wrong in conditions.items() if wrong]
-
-
-def _nearest(folder: Path) -> Path:
-    while not folder.exists() and folder != folder.parent:
-        folder = folder.parent
-    return folder
 
 
 @contextmanager

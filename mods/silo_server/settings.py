@@ -60,6 +60,8 @@ class Settings:
         for how many days, and up to how many bytes, answers are kept for repeated requests.
     warnings
         what was wrong with the settings at the start, for the page of the system; not from the environment.
+    openapi_login
+        show the OpenAPI document to users who are logged in only.
     release_labels
         names of the revisions of products: ``letters`` (A, B, … without I and O) or ``numbers`` (1.0, 2.0).
     release_wants
@@ -94,6 +96,7 @@ class Settings:
     request_body_seconds: float = 60.0
     session_seconds: float = 24 * 3600.0
     login_link_seconds: float = 3600.0
+    openapi_login: bool = False
     login_failures: int = 5
     login_window_seconds: float = 300.0
     secure_cookies: bool = False
@@ -190,7 +193,7 @@ _NAMES = (
         "public_url",
     ),
     *("admin_username", "admin_password", "freecad_version", "release_labels", "release_approvals"),
-    *("release_override", "release_wants", "find_number_step", "trusted_proxies"),
+    *("release_override", "release_wants", "find_number_step", "openapi_login"),
 )
 _ENVIRONMENT = {name: f"SILO_{name.upper()}" for name in _NAMES} | {"files_dir": "SILO_STORAGE_ROOT_DIR"}
 

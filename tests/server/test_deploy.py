@@ -14,6 +14,7 @@ import ssl
 import subprocess
 from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,14 @@ import pytest
 from model_file import model_file
 from server_testing import Api, reserved_port, sqlite_database, wait_until
 
+from silo.api.client import SiloClient
+from silo.api.policy import Retries
+from silo.bom.errors import SiloError
 from silo.cli.parser import build_parser
+from silo.cli.setup.site_checks import site
+from silo_server.backup import BACKED_UP, RESTORE_TRIED
+from silo_server.db.database import Database
+from silo_server.db.state import put_state
 from silo_server.run import RunningServer, running_server
 from silo_server.settings import _ENVIRONMENT, Settings
 
@@ -42,14 +50,21 @@ def test_every_variable_is_one_of_ours() -> None:
 
 
 @pytest.mark.parametrize(
-    "unit", [DEPLOY / "silo.service", DEPLOY / "silo-backup.service", NIGHT / "silo-sync.service"], ids=str
+    "unit",
+    [
+        DEPLOY / "silo.service",
+        DEPLOY / "silo-backup.service",
+        DEPLOY / "silo-restore-test.service",
+        NIGHT / "silo-sync.service",
+    ],
+    ids=str,
 )
 def test_the_units_call_commands_that_there_are(unit: Path) -> None:
     """With options that the command line takes."""
     line = re.search(r"silo-mod ([^'\n]+)", unit.read_text("utf-8").split("ExecStart=")[1])
     assert line is not None
-    args = build_parser().parse_args(re.sub(r"\$\$\(.*?\)", "", line[1]).replace('"', "").split())
-    assert args.command in ("serve", "backup", "sync")
+    args = build_parser().parse_args(re.sub(r"\$\$\(.*?\)", "x", line[1]).replace('"', "").split())
+    assert args.command in ("serve", "backup", "restore", "sync")
 
 
 def test_the_image_copies_all_that_its_package_is_built_from() -> None:
@@ -112,10 +127,9 @@ def test_nginx_passes_pages_and_events_on(tmp_path: Path, sub_path: str) -> None
     ):
         text = (DEPLOY / "nginx.conf").read_text("utf-8")
         text = re.sub(r"ssl_\w+ .*;", "", text).replace("listen 443 ssl", f"listen 127.0.0.1:{port}")
+        text = text.replace("listen 80;", f"listen unix:{tmp_path}/plain;")
         text = text.replace("http://127.0.0.1:8080", server.base_url)
-        text = text.replace("location /api", f"location {sub_path}/api").replace(
-            "location / ", f"location {sub_path}/ "
-        )
+        text = text.replace("location /", f"location {sub_path}/")
         with nginx(text, tmp_path), Api(f"http://127.0.0.1:{port}", TOKEN) as api:
 
             def up() -> bool:
@@ -149,7 +163,7 @@ def test_tls_the_public_address_events_and_a_large_upload(tmp_path: Path) -> Non
     made = "openssl req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN=localhost".split()  # noqa: SIM905
     made += ["-addext", "subjectAltName=DNS:localhost", "-keyout", str(key), "-out", str(certificate)]
     subprocess.run(made, check=True, capture_output=True)
-    with reserved_port() as port:
+    with reserved_port() as port, reserved_port() as plain:
         public = f"https://localhost:{port}"
         url = sqlite_database(tmp_path / "x.db")
         settings = Settings(database_url=url, public_url=public, secure_cookies=True)
@@ -159,8 +173,67 @@ def test_tls_the_public_address_events_and_a_large_upload(tmp_path: Path) -> Non
             text = re.sub(r"(ssl_certificate) .*;", rf"\1 {certificate};", text)
             text = re.sub(r"(ssl_certificate_key) .*;", rf"\1 {key};", text)
             text = text.replace("http://127.0.0.1:8080", server.base_url)
+            text = text.replace("listen 80;", f"listen 127.0.0.1:{plain};")
+            text = text.replace("silo.example.com", "localhost")
             with nginx(text, tmp_path), ExitStack() as stack:
                 _try_all(f"localhost:{port}", ssl.create_default_context(cafile=certificate), server, stack)
+                _look(public, plain, certificate, server, {"TLS": "ends in 1 day", **WITHOUT_BACKUP})
+                set_up(server)
+                _look(public, plain, certificate, server, {"TLS": "ends in 1 day"})
+                week = {"tls": datetime.now(UTC) - timedelta(days=30)}
+                _look(public, plain, certificate, server, {"clock": "apart"}, now=week["tls"])
+            faulty = {
+                "port 80": ("return 301 https://", "return 404; #"),
+                "HSTS": ("add_header Strict", "#"),
+                "proxy": ("proxy_set_header X-Forwarded-Proto $scheme;", ""),
+            }
+            for name, (line, instead) in faulty.items():
+                assert line in text
+                with nginx(text.replace(line, instead), tmp_path):
+                    _look(public, plain, certificate, server, {"TLS": "ends in 1 day", name: WRONG[name]})
+            hidden = text.replace("$proxy_add_x_forwarded_for", "$http_x_forwarded_for")
+            with nginx(hidden, tmp_path):
+                _look(
+                    public, plain, certificate, server, {"TLS": "ends in", "proxy": "does not add the caller"}
+                )
+
+
+WRONG = {"port 80": "status 404", "HSTS": "does not tell browsers", "proxy": "let the proxy send"}
+WITHOUT_BACKUP = {"backup": "there is none", "test restore": "no backup was ever restored"}
+
+
+def set_up(server: RunningServer) -> None:
+    """Write down a backup of today on another disk, and its test restore."""
+    db = Database(server.settings)
+    with db.write() as tx:
+        put_state(tx, BACKED_UP, json.dumps({"at": tx.stamp, "target": "/b", "same_disk": False}))
+        put_state(tx, RESTORE_TRIED, json.dumps({"at": tx.stamp, "made_at": tx.stamp}))
+    db.close()
+
+
+def _look(
+    public: str,
+    plain: int,
+    certificate: Path,
+    server: RunningServer,
+    faults: dict[str, str],
+    now: datetime | None = None,
+) -> None:
+    """``doctor --server`` names these faults and no others."""
+
+    def answers() -> bool:
+        try:
+            return client.ready().status == "ready"
+        except SiloError:
+            return False
+
+    with SiloClient(public, TOKEN, verify=str(certificate), retries=Retries(tries=1)) as client:
+        wait_until(answers, "nginx")
+        clock = (lambda: now) if now else (lambda: datetime.now(UTC))
+        found = site(client, str(certificate), plain_port=plain, now=clock)
+    wrong = {name: str(value) for name, value in found.items() if isinstance(value, SiloError)}
+    assert wrong.keys() == faults.keys(), wrong
+    assert all(words in wrong[name] for name, words in faults.items()), wrong
 
 
 def _try_all(host: str, trust: ssl.SSLContext, server: RunningServer, stack: ExitStack) -> None:

@@ -3,14 +3,22 @@
 
 from __future__ import annotations
 
+import json
+import shutil
+import tempfile
+from dataclasses import replace
 from pathlib import Path
 from urllib.parse import quote
 
 import pytest
-from server_testing import Api, bom
+from server_testing import Api, bom, sqlite_database
 from web_visitor import Visitor
 
-from silo_server.backup import back_up
+from silo.bom.errors import ConfigError
+from silo_server.backup import RESTORE_TRIED, back_up, try_restore
+from silo_server.db.database import Database
+from silo_server.db.state import get_state
+from silo_server.open_secrets import open_secrets
 from silo_server.run import RunningServer, running_server
 from silo_server.settings import Settings
 
@@ -31,11 +39,66 @@ def test_the_api_says_how_the_server_is(url: str, tmp_path: Path) -> None:
         assert told["queues"]["exports and large reads"] == 0
         assert told["warnings"] == ["SILO_PUBLIC_URL is not set."]
         assert told["database_bytes"] > 0
-        assert told["free_bytes"] is None  # the first upload makes the folder
+        assert told["free_bytes"] > 0  # also before the first upload, which makes the folder
+        assert (told["request"]["scheme"], told["request"]["address"]) == ("http", "127.0.0.1")
+        assert (told["restore_tried"], told["secure_cookies"]) == (None, False)
         with server.app.state.server.large_reads.enter():
             assert api.get("/api/admin/system")["queues"]["exports and large reads"] == 1
         back_up(server.settings, tmp_path / "saved")
-        assert api.get("/api/admin/system")["backup"]["target"] == str(tmp_path / "saved")
+        told = api.get("/api/admin/system")
+        assert (told["backup"]["target"], told["backup"]["same_disk"]) == (str(tmp_path / "saved"), True)
+        made = try_restore(server.settings, tmp_path / "saved")
+        tried = api.get("/api/admin/system")["restore_tried"]
+        assert (tried["made_at"], tried["source"]) == (made.made_at, str(tmp_path / "saved"))
+        assert api.get("/api/admin/system")["items"] == 1  # its own state stays
+
+
+def test_a_test_restore_that_lacks_rows_is_no_success(db: Database, tmp_path: Path) -> None:
+    """The manifest says how many there were; the server notes no day."""
+    target = tmp_path / "saved"
+    back_up(db.settings, target)
+    manifest = json.loads((target / "manifest.json").read_text("utf-8"))
+    manifest["rows"]["users"] += 1
+    (target / "manifest.json").write_text(json.dumps(manifest), "utf-8")
+    with pytest.raises(ConfigError, match=r"these differ: users$"):
+        try_restore(db.settings, target)
+    with db.read() as tx:
+        assert get_state(tx, RESTORE_TRIED) is None
+    assert sorted(path.name for path in tmp_path.iterdir() if path.name.startswith(".restore")) == []
+
+
+def test_the_document_needs_a_login_if_the_site_says_so(tmp_path: Path) -> None:
+    """Without the setting everybody reads it."""
+    for wanted, status in ((False, 200), (True, 401)):
+        url = sqlite_database(tmp_path / f"{status}.db")
+        settings = Settings(database_url=url, openapi_login=wanted)
+        with running_server(url, token=TOKEN, settings=settings) as server, Api(server.base_url) as api:
+            assert api.call("GET", "/api/openapi.json").status == status
+            assert "paths" in api.as_(TOKEN).get("/api/openapi.json")
+
+
+@pytest.mark.usefixtures("needs_modes")
+def test_secrets_that_lie_open_are_named(tmp_path: Path) -> None:
+    """Of a password that can be guessed, a first password that is still set, and files that others read."""
+    database = tmp_path / "silo.db"
+    database.touch()
+    mine = Settings(database_url=f"sqlite:///{database}", files_dir=tmp_path / "files")
+    assert open_secrets(mine) == []
+    assert open_secrets(replace(mine, admin_password="x")) == ["admin_password"]
+    for password, found in (("password", True), ("silo", True), ("kT7rQm2wZx", False)):
+        theirs = replace(mine, database_url=f"postgresql://silo:{password}@db/silo")
+        assert open_secrets(theirs) == (["database_password"] if found else [])
+    assert open_secrets(replace(mine, database_url="postgresql://silo@db/silo")) == []
+    public = Path(tempfile.mkdtemp(dir="/tmp"))
+    try:
+        (public / "files").mkdir()
+        for folder in (public, public / "files"):
+            folder.chmod(0o755)
+        assert open_secrets(replace(mine, files_dir=public / "files")) == [f"readable: {public / 'files'}"]
+        public.chmod(0o750)
+        assert open_secrets(replace(mine, files_dir=public / "files")) == []
+    finally:
+        shutil.rmtree(public)
 
 
 def test_the_page_says_what_is_wrong(visitors: dict[str, Visitor]) -> None:

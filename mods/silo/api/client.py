@@ -30,7 +30,7 @@ from silo.api.policy import Retries
 from silo.api.sse import ServerEvent
 from silo.api.tables import TableCalls
 from silo.api.transport import ApiCall, Cancel, Timeouts, Transport, stop_if
-from silo.api.wire import ServerState, User, login_code
+from silo.api.wire import ServerState, SystemState, User, login_code
 from silo.bom.errors import SiloError
 from silo.bom.message import message
 
@@ -120,6 +120,11 @@ class SiloClient(ItemCalls, BomCalls, TableCalls):
         """Return the address of the server's pages, without a slash at the end."""
         return self._address.web_root
 
+    @property
+    def local(self) -> bool:
+        """Return True if the server is on this machine."""
+        return self._address.is_loopback
+
     def web_url(self, path: str, /) -> str:
         """Return the full address of a page such as ``resolve_url``. :class:`InputError` for a page of
         another server.
@@ -169,6 +174,21 @@ class SiloClient(ItemCalls, BomCalls, TableCalls):
             reply = self._transport.reply(response, call)
         # A server that is not ready says so with 503, and why in the same form.
         return ServerState.model_validate(reply.mapping(accept=(503,)))
+
+    def system(self, forwarded_for: str) -> SystemState:
+        """Return how the server is, and how the request reached it; for administrators.
+
+        forwarded_for
+            the address that the request claims to come from. Who believes the claim believes everybody.
+        """
+        call = ApiCall(
+            "GET",
+            f"{self._address.web_root}/api/admin/system",
+            message("how it is"),
+            headers={"X-Forwarded-For": forwarded_for},
+            repeatable=True,
+        )
+        return self._transport.send(call).model(SystemState)
 
     def modules(self) -> list[str]:
         """Return the names of the server's modules that are on."""

@@ -845,6 +845,44 @@ class ServerState(Record):
     freecad: str = ""
 
 
+class HowReached(Record):
+    """How a request reached the server, as the server saw it."""
+
+    scheme: str = ""
+    address: str = ""
+    forwarded_for: str = ""
+
+
+class LastBackup(Record):
+    """``same_disk``: it lies on the disk of the server's files; None if the server does not say."""
+
+    at: str
+    target: str = ""
+    same_disk: bool | None = None
+
+
+class TriedRestore(Record):
+    """A test restore: when, and of the backup of which time."""
+
+    at: str
+    made_at: str = ""
+
+
+class SystemState(Record):
+    """``GET /api/admin/system``, as far as ``silo-mod doctor`` asks."""
+
+    at: str = ""
+    request: HowReached | None = None
+    public_url: str | None = None
+    secure_cookies: bool | None = None
+    open_secrets: list[str] | None = None
+    free_bytes: int | None = None
+    database_bytes: int = 0
+    backup: LastBackup | None = None
+    restore_tried: TriedRestore | None = None
+    warnings: list[str] = []
+
+
 def login_code(proof: str) -> str:
     """Return the code that a program and the page that lets it in both show, so that a user can compare."""
     return f"{proof[:4]}-{proof[4:8]}".upper()

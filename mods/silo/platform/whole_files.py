@@ -42,6 +42,13 @@ def scratch_folder(prefix: str, parent: Path | str | None = None) -> tempfile.Te
     return tempfile.TemporaryDirectory(prefix=prefix, dir=parent, ignore_cleanup_errors=True)
 
 
+def nearest_folder(path: Path) -> Path:
+    """Return the path, or the nearest folder above it that exists."""
+    while not path.exists() and path != path.parent:
+        path = path.parent
+    return path
+
+
 @contextmanager
 def replacing(path: Path | str, *, mode: int | None = None) -> Iterator[BinaryIO]:
     """Write the new content of a file: at any moment ``path`` has all of the old content or all of the new.

@@ -6,23 +6,22 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any, Literal
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Request
 from prometheus_client import CONTENT_TYPE_LATEST
 from pydantic import BaseModel
 from starlette.responses import Response
 
+from silo.bom.errors import AuthError
 from silo_server.db.state import mode_of
 from silo_server.housekeeping import last_run
+from silo_server.http.unknown_callers import NEEDS_TOKEN
 from silo_server.probe import HEALTH_SECONDS, READY_SECONDS, ServerStanding
 from silo_server.routes.answers import READ_ERRORS, json_answer
-from silo_server.routes.call import (
-    Admin,
-    ServerDep,
-    Viewer,
-)
+from silo_server.routes.call import Admin, ServerDep, Viewer, client_address, find_actor
 from silo_server.routes.requests import BoundedRoute
 from silo_server.services.mode import change_mode
 from silo_server.standing import standing
+from silo_server.times import stamp
 
 router = APIRouter(route_class=BoundedRoute, tags=["system"])
 MODULES = (
@@ -90,6 +89,14 @@ def metrics(call: Viewer) -> Response:
     return Response(rendered, headers={"Content-Type": CONTENT_TYPE_LATEST})
 
 
+@router.get("/api/openapi.json", include_in_schema=False)
+def openapi_document(request: Request, server: ServerDep) -> Response:
+    """Return the OpenAPI document; where ``SILO_OPENAPI_LOGIN`` is set, to known callers only."""
+    if server.settings.openapi_login and find_actor(request) is None:
+        raise AuthError(NEEDS_TOKEN)
+    return json_answer(request.app.openapi(), 200)
+
+
 @router.get("/api/modules", responses=READ_ERRORS)
 async def modules(call: Viewer) -> dict[str, Any]:
     """Return the modules of this server."""
@@ -105,9 +112,19 @@ def get_mode(call: Admin) -> dict[str, Any]:
 
 @router.get("/api/admin/system", responses=READ_ERRORS)
 def get_system(call: Admin) -> dict[str, Any]:
-    """Return version, database, disk, last backup and housekeeping, queues, counts, warnings of the start."""
-    server = call.server
-    return standing(server.db, server.hub, server.files, server.large_reads)
+    """Return version, database, disk, last backup and housekeeping, queues, counts, warnings of the start.
+
+    ``request`` is how this request reached the server, so that the caller can see what a proxy makes of it.
+    """
+    server, request = call.server, call.request
+    return standing(server.db, server.hub, server.files, server.large_reads) | {
+        "at": stamp(server.db.clock()),
+        "request": {
+            "scheme": request.url.scheme,
+            "address": client_address(request),
+            "forwarded_for": request.headers.get("x-forwarded-for", ""),
+        },
+    }
 
 
 @router.get("/api/admin/housekeeping", responses=READ_ERRORS)

@@ -195,6 +195,7 @@ def _listed(texts: Iterable[str]) -> str:
 def _server(args: argparse.Namespace) -> Rows:
     from silo.api.abilities import Abilities
     from silo.api.config import resolve_server
+    from silo.cli.setup.site_checks import site
 
     try:
         where = resolve_server(args.server, args.token)
@@ -206,6 +207,7 @@ def _server(args: argparse.Namespace) -> Rows:
                 ),
                 "token": message("from {token_from}", token_from=where.token_from) if where.token else "none",
                 **look(client, args.schema),
+                **(site(client, where.verify) if args.server else {}),
             }
     except ConfigError as error:
         return {"address": error}

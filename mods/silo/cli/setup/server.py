@@ -75,11 +75,15 @@ def add_restore(parser: argparse.ArgumentParser) -> None:
         {
             "--replace-database": message("replace a database that has items; they are lost"),
             "--dry-run": message("only check that the backup is whole; change nothing"),
+            "--test": message(
+                "restore into a scratch folder beside the backup, compare, and note the day at the server"
+            ),
         },
     )
     _add_place(parser)
     add_old_name(parser, "--replace", "--replace-database")
     add_old_name(parser, "--verify", "--dry-run")
+    not_with(parser, "--test", "--replace-database", "--dry-run")
     not_with(parser, "--dry-run", "--replace-database", "--database", "--files")
 
 
@@ -152,15 +156,24 @@ def run_backup(args: argparse.Namespace) -> int:
 
 
 def run_restore(args: argparse.Namespace) -> int:
-    """Replace the server's state by a backup, or with ``--dry-run`` only check that the backup is whole."""
+    """Replace the server's state by a backup; ``--dry-run`` only checks it, ``--test`` restores it beside."""
     need_server_extra()
-    from silo_server.backup import restore, verify
+    from silo_server.backup import restore, try_restore, verify
     from silo_server.settings import settings_from_environment
 
     if args.dry_run:
         made = verify(args.source)
         text = message(
             "The backup of {made_at} is whole: {rows} rows, {files} files.",
+            made_at=made.made_at,
+            rows=sum(made.rows.values()),
+            files=made.files,
+        )
+    elif args.test:
+        settings = settings_from_environment(database_url=args.database, files_dir=args.files)
+        made = try_restore(settings, args.source, _report)
+        text = message(
+            "The backup of {made_at} can be restored: {rows} rows, {files} files.",
             made_at=made.made_at,
             rows=sum(made.rows.values()),
             files=made.files,
