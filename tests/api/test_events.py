@@ -13,7 +13,7 @@ import pytest
 from silo.api.client import SiloClient
 from silo.api.events import SELDOM, Connection, ConnectionState, EventListener, Pauses
 from silo.api.pause import Pause
-from silo.api.policy import Backoff
+from silo.api.policy import REFUSED_PAUSES, Backoff
 from silo.api.sse import ServerEvent
 from silo.bom.errors import AuthError, PackageError, ServerFaultError, UnreachableError
 from silo.testing import FakeSilo
@@ -170,9 +170,10 @@ def test_a_mark_that_the_server_refuses_is_given_up(
 @pytest.mark.parametrize(
     ("given", "kind", "again", "word"),
     [
-        ((401, {"error": "x"}), Connection.REFUSED, None, "token"),
+        ((401, {"error": "x"}), Connection.REFUSED, REFUSED_PAUSES.first, "token"),
         ((403, {"error": "x"}), Connection.REFUSED, SELDOM, "token"),
-        ((302, "", {"Location": "/login"}), Connection.REFUSED, None, "login"),  # a proxy with single sign-on
+        # A proxy with single sign-on.
+        ((302, "", {"Location": "/login"}), Connection.REFUSED, REFUSED_PAUSES.first, "login"),
         (
             (404, "404 page not found"),
             Connection.UNSUPPORTED,

@@ -223,8 +223,9 @@ def test_a_clock_that_is_set_back_holds_nothing_up(tmp_path: Path, proxy: Proxy,
 
 
 # A child that is not root: root may write anywhere. Files may not grow over LIMIT bytes: a disk that is full.
+# ``fcntl`` is imported while it may read the folder of its Python, which is root's own in some machines.
 CHILD = """
-import os, resource, signal, sys
+import fcntl, os, resource, signal, sys
 from pathlib import Path
 from silo.bom.errors import SiloError
 from silo.outbox.entry import Commit

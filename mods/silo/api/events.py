@@ -144,7 +144,7 @@ class Connection(StrEnum):
     READ_ONLY = "read-only"  # events come in, the server takes no changes now
     DEGRADED = "degraded"  # events come in, a part of the server fails
     OFFLINE = "offline"  # no connection; it is tried again
-    REFUSED = "refused"  # the token is not accepted; not tried again before a user acts
+    REFUSED = "refused"  # the token is not accepted; tried again rarely, or when a user acts
     UNSUPPORTED = "unsupported"  # the server has no events; tried again rarely, it may be updated
     NO_READER = "no-reader"  # a Python package is missing; tried again rarely, it may be installed
     STOPPED = "stopped"  # by stop()

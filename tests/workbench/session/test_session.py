@@ -206,7 +206,7 @@ def test_a_commit_that_a_full_disk_kept_is_not_reported_as_lost(office: Office, 
     made = commit(office, "Bolt", hold=hold)
     base = DocumentOrigin(made.path, stamp_of(made.path), UNKNOWN)
     keep(office, made, base)
-    office.session._waits(((), None))  # read before there was anything
+    office.session._waits(((), None, ()))  # read before there was anything
     office.settle()
     assert base.content == hashlib.sha256(b"content").hexdigest()  # the next commit is made from this one
     assert any("Bolt: The commit is kept. It is sent as soon" in line for line in office.console)
