@@ -150,7 +150,7 @@ def api() -> str:
     with tempfile.TemporaryDirectory() as folder:
         described = create_app(Settings(database_url=f"sqlite:///{folder}/x.db")).openapi()
     lines = ["# The server's API", "", "A running server describes itself in full at `/api/openapi.json`."]
-    lines += ["[The server](../server.md) says what merges, events, tokens and files mean."]
+    lines += ["[The API](../server-api.md) says what merges, events, tokens and files mean."]
     by_tag: dict[str, list[str]] = {}
     for path, methods in described["paths"].items():
         for method, request in methods.items():

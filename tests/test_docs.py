@@ -135,7 +135,7 @@ def test_the_reference_has_all_that_there_is() -> None:
 def test_every_setting_is_on_the_page_about_them() -> None:
     """Environment variables of the client, and the preferences of the add-on with their defaults."""
     page = (ROOT / "docs" / "configuration.md").read_text("utf-8")
-    server = (ROOT / "docs" / "server.md").read_text("utf-8")
+    server = (ROOT / "docs" / "server-settings.md").read_text("utf-8")
     source = "".join(path.read_text("utf-8") for path in (ROOT / "mods").rglob("*.py"))
     for name in set(re.findall(r"\b(?:SILO|FREECAD)_[A-Z_]*[A-Z]\b", source)) - INSIDE:
         assert f"`{name}`" in page or f"`{name}`" in server, name

@@ -199,7 +199,7 @@ _ENVIRONMENT = {name: f"SILO_{name.upper()}" for name in _NAMES} | {"files_dir":
 
 
 def settings_from_environment(environ: Mapping[str, str] | None = None, **given: Any) -> Settings:
-    """Read the settings from ``SILO_…`` variables (docs/server.md lists them); ``given`` wins over them."""
+    """Read the settings from ``SILO_…`` variables (docs/server-settings.md); ``given`` wins over them."""
     environ = os.environ if environ is None else environ
     values: dict[str, Any] = {"database_url": default_database_url()}
     kinds = {f.name: str(f.type) for f in fields(Settings)}

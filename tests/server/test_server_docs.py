@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""docs/server.md names every route, every setting and every event; what it shows can be read."""
+"""The pages about the server name every route, every setting and every event; what they show can be read."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import pytest
 from silo_server.run import create_app
 from silo_server.settings import _ENVIRONMENT, Settings
 
-DOCS = Path(__file__).parents[2] / "docs" / "server.md"
+DOCS = Path(__file__).parents[2] / "docs"
 
 
 @pytest.fixture(scope="module")
 def text() -> str:
-    """The page."""
-    return DOCS.read_text("utf-8")
+    """All pages about the server."""
+    return "\n".join(page.read_text("utf-8") for page in sorted(DOCS.glob("server*.md")))
 
 
 def test_every_route_is_named(text: str, tmp_path: Path) -> None:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """An address with a parameter that its route does not declare is refused.
 
-A misspelt ``?relaese=B`` would show the draft, and nothing on paper would say so. This holds for the pages
-and for the files that are made of a BOM; other routes of the API take what newer clients send.
+``?rel=B`` for ``?release=B`` would show the draft, and nothing on paper would say so. This holds for the
+pages and for the files that are made of a BOM; other routes of the API take what newer clients send.
 """
 
 from __future__ import annotations
