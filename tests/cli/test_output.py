@@ -196,10 +196,10 @@ def test_paths_are_those_of_the_caller(
 
 
 def test_a_part_has_an_empty_bom_and_nothing_beside(run: Any, gearbox: Path) -> None:
-    """One finding that says so."""
+    """One finding that says so: the file is one part, and no assembly."""
     found = run("bom", gearbox.parent / "parts" / "Gear.FCStd", "--json").json()
     assert found["entries"] == []
-    assert [finding["code"] for finding in found["findings"]] == ["empty_bom"]
+    assert [(finding["code"], finding["severity"]) for finding in found["findings"]] == [("one_part", "info")]
 
 
 def test_a_name_of_a_megabyte_does_not_fill_the_terminal(run: Any, silo: Any, tmp_path: Path) -> None:

@@ -17,7 +17,6 @@ from typing import Any
 
 import FreeCAD
 
-from silo.bom import message as sentences
 from silo.workbench.words import visible
 
 # --- FreeCAD itself --------------------------------------------------------------------------------------
@@ -44,13 +43,14 @@ def version() -> tuple[int, int]:
 def program() -> str:
     """Find the command line program of this FreeCAD. Raises ConfigError if it is not found."""
     from silo.bom.errors import ConfigError
+    from silo.bom.message import message
 
     folders = (os.path.dirname(sys.executable or ""), os.path.join(FreeCAD.getHomePath(), "bin"))
     names = (os.path.basename(sys.executable or ""), "freecadcmd", "FreeCADCmd", "freecadcmd.exe")
     for path in (os.path.join(folder, name) for folder in folders for name in names):
         if "freecadcmd" in os.path.basename(path).lower() and os.path.isfile(path):
             return path
-    raise ConfigError(sentences.message("FreeCAD does not say which program runs it"))
+    raise ConfigError(message("FreeCAD does not say which program runs it"))
 
 
 def user_data_folder() -> str:
