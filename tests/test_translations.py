@@ -110,10 +110,10 @@ def test_gettext_reads_what_was_compiled(script: ModuleType) -> None:
                 ]
 
 
-# Words of HTML, and of addresses, that stand in the expressions of templates.
+# Words of HTML and of addresses, and names of programs, that stand in the expressions of templates.
 _NO_TEXT = {
     *("ascending", "descending", "true", "false", "yes", "no", "open", "incomplete", "changed", "required"),
-    *("maxLength", "/items", "?since=look", "CSV 1,5"),
+    *("maxLength", "/items", "?since=look", "CSV 1,5", "Odoo", "InvenTree"),
 }
 
 

@@ -10,7 +10,7 @@ from uuid import uuid4
 from openpyxl import load_workbook
 from playwright.sync_api import Page, expect
 from server_testing import Api, bom, merge_body
-from settled import measured
+from settled import box_of, measured
 
 Visit = Callable[..., Page]
 
@@ -80,7 +80,6 @@ def test_an_order_list_fits_its_sheet(visit: Visit, api: Api) -> None:
     page = visit("admin", viewport={"width": 703, "height": 1000})  # 186 mm
     page.goto(f"/items/{top}/order?pieces=5")
     page.emulate_media(media="print")
-    assert page.evaluate("document.documentElement.scrollWidth") <= 703
-    last = page.get_by_role("cell", name="21 days").bounding_box()
-    assert last is not None
+    assert measured(page, "document.documentElement.scrollWidth") <= 703
+    last = box_of(page.get_by_role("cell", name="21 days"))
     assert last["x"] + last["width"] <= 703

@@ -8,6 +8,7 @@ from collections import namedtuple
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from datetime import timedelta
+from decimal import Decimal
 from types import SimpleNamespace
 from typing import Any
 
@@ -19,6 +20,7 @@ from sqlalchemy import select, update
 
 from silo.bom.errors import AuthError, ConflictError, RejectedError
 from silo.bom.headers import plain_cell, safe_cell
+from silo.bom.quantities import quantity_of
 from silo_server.actors import SYSTEM, Actor, Role
 from silo_server.db.database import Database
 from silo_server.db.rows import insert_rows, one_of, update_rows
@@ -47,9 +49,11 @@ from silo_server.user_json import dumps
 from silo_server.values import LineState
 
 text = st.text(max_size=20)
+# As fields and bodies are read: a quantity is the decimal number that was typed.
+quantities = st.floats(1e-6, 1e9).map(quantity_of)
 states = st.builds(
     LineState,
-    quantity=st.floats(1e-6, 1e9),
+    quantity=quantities,
     source=st.sampled_from(["assembly", "manual"]),
     rel_type=st.sampled_from(["component", "alternate", "reference"]),
     unit=st.none() | text,
@@ -59,7 +63,7 @@ states = st.builds(
     child_revision=st.none() | st.integers(0, 9),
     unreferenced_since=st.none() | st.just("2026-02-08T22:15:00.000000Z"),
     override=st.booleans(),
-    cad_quantity=st.none() | st.floats(1e-6, 1e9),
+    cad_quantity=st.none() | quantities,
     reason=st.none() | text,
     metadata=st.dictionaries(text, st.integers() | text, max_size=2),
 )
@@ -72,9 +76,9 @@ def test_a_state_comes_back_from_the_history_as_it_was(state: LineState) -> None
     assert {f.name for f in fields(LineState)} >= set(state_to_json(state))
 
 
-@given(states, st.floats(1e-3, 1e6))
+@given(states, quantities)
 def test_a_person_s_quantity_always_ends_up_a_person_s_or_the_assembly_s_own(
-    state: LineState, quantity: float
+    state: LineState, quantity: Decimal
 ) -> None:
     """After another quantity by hand a line is manual, unless it is what the assembly said."""
     after = edited_state(state, {"quantity": quantity})

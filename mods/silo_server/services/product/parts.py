@@ -78,7 +78,9 @@ _read_json = json.JSONDecoder().raw_decode
 
 
 def some_parts(tx: Tx, item_ids: Collection[int]) -> dict[int, RolledItem]:
-    """Read what roll-ups need of these items, by internal id."""
+    """Read what roll-ups need of these items, by internal id; without items nothing is asked."""
+    if not item_ids:
+        return {}
     query = select(*ROLLED).where(one_of(tx, items.c.id, item_ids))
     return dict(map(rolled_item, tx.conn.execute(query)))
 

@@ -2699,10 +2699,6 @@ Sie werden in {folder} installiert.</translation>
             <source>Nothing is sent to {host} for {time}: {reason}</source>
             <translation>Für {time} wird nichts an {host} gesendet: {reason}</translation>
         </message>
-        <message>
-            <source>{n} sent, {same} the same in Silo</source>
-            <translation type="vanished">{n} gesendet, {same} gleich in Silo</translation>
-        </message>
     </context>
     <context>
         <name>Origin_Commit</name>
