@@ -126,6 +126,8 @@ if words[0] == "-c":
     sys.exit()
 with open({log!r}, "a") as log:
     print(*words, file=log)
+if any(word.startswith({absent!r}) for word in words):
+    sys.exit("ERROR: No matching distribution found for " + words[-1])
 folder = pathlib.Path(words[words.index("--target") + 1])
 folder.mkdir(parents=True, exist_ok=True)
 for name in ("requests", "pydantic"):
@@ -133,12 +135,16 @@ for name in ("requests", "pydantic"):
 """
 
 
-def own_python(folder: Path, version: str, content: str = "") -> tuple[str, Path]:
-    """A Python with a pip that notes what it is asked for, and installs modules of that content."""
+def own_python(folder: Path, version: str, content: str = "", absent: str = "no-package") -> tuple[str, Path]:
+    """A Python with a pip that notes what it is asked for, and installs modules of that content.
+
+    absent
+        the package that its index does not have.
+    """
     folder.mkdir()
     log = folder / "log"
     log.touch()
-    text = PIP.format(python=sys.executable, version=version, log=str(log), content=content)
+    text = PIP.format(python=sys.executable, version=version, log=str(log), content=content, absent=absent)
     return program(folder / "python3", text), log
 
 
@@ -180,6 +186,28 @@ def test_success_is_an_import_inside_freecad(tmp_path: Path) -> None:
     command.write_text(command.read_text().replace("exec(sys.argv[2])", bare))
     with pytest.raises(ConfigError, match=r"FreeCAD cannot import them: .*made for another Python"):
         install_packages(replace(found, missing={"requests": ""}))
+
+
+def missing_here(tmp_path: Path, *names: str, absent: str) -> Installation:
+    """A FreeCAD that lacks these packages; its pip does not find ``absent``."""
+    own, _ = own_python(tmp_path / "own", HERE, absent=absent)
+    found = ask_freecad(stand_in(tmp_path, tmp_path / "data"))
+    return replace(found, pythons=(own,), missing=dict.fromkeys(names, "ModuleNotFoundError"))
+
+
+def test_an_optional_package_that_is_not_found_keeps_no_needed_one_back(tmp_path: Path) -> None:
+    """The needed ones are there; what is not there is reported, with what that means."""
+    found = missing_here(tmp_path, "requests", "pydantic", "sseclient", absent="sseclient-py")
+    with pytest.raises(ConfigError, match=r"could not install sseclient-py\S+ for Python .* no live events$"):
+        install_packages(found)
+    assert {path.name for path in found.packages.iterdir()} == {"requests.py", "pydantic.py"}
+
+
+def test_without_a_needed_package_nothing_else_is_tried(tmp_path: Path) -> None:
+    found = missing_here(tmp_path, "requests", "pydantic", "sseclient", absent="pydantic")
+    with pytest.raises(ConfigError, match=r"could not install requests\S+ pydantic\S+ for Python [^;]*$"):
+        install_packages(found)
+    assert not found.packages.exists()
 
 
 def test_an_archive_of_the_repository_is_small(tmp_path: Path) -> None:

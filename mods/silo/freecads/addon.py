@@ -12,14 +12,14 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from silo import FREECAD_PACKAGES, OPTIONAL_PACKAGES
 from silo.bom.errors import ConfigError, InputError
-from silo.bom.message import message
+from silo.bom.message import joined, message
 from silo.freecads.run import ask_inside, find_freecadcmd
 from silo.platform.processes import child_options, python_beside
 from silo.platform.whole_files import remove_patiently
@@ -198,54 +198,80 @@ def _remove_old(place: Installation) -> None:
 def install_packages(place: Installation) -> str:
     """Install what the add-on lacks inside this FreeCAD, let FreeCAD import it, and return its folder.
 
-    Packages that are there already stay unchanged, because other add-ons use them too. ConfigError if FreeCAD
-    still cannot import one of the packages.
+    Packages that are there already stay unchanged, because other add-ons use them too. The needed packages
+    come first, so that an optional one that pip does not find keeps none of them back. ConfigError if a
+    package is not installed, or if FreeCAD still cannot import it.
     """
-    version = "{}.{}".format(*place.python)
     if place.python < (3, 11):
         raise ConfigError(
-            message("this FreeCAD has Python {version}; the add-on needs 3.11 or newer", version=version)
+            message(
+                "this FreeCAD has Python {version}; the add-on needs 3.11 or newer",
+                version="{}.{}".format(*place.python),
+            )
         )
     if not place.missing:
         return str(place.packages)
-    names = [ALL_PACKAGES[name] for name in place.missing]
-    install = ["install", "--quiet", "--target", str(place.packages), *names]
-    # Packages there that cannot be imported, such as those for another Python, are useless.
-    if any((place.packages / name).exists() for name in place.missing):
-        install.append("--upgrade")
+    needed = [name for name in place.missing if name in FREECAD_PACKAGES]
+    optional = [name for name in place.missing if name not in FREECAD_PACKAGES]
+    pip = _pip(place)
+    if needed and (failed := _install(place, pip, needed)):
+        raise ConfigError(failed)
+    failed = _install(place, pip, optional) if optional else ""
+    missing = {
+        name: reason
+        for name, reason in ask_freecad(place.command, place.data).missing.items()
+        if not failed or name not in optional
+    }
+    problems: list[str] = []
+    if missing:
+        reasons = [message("{name}: {reason}", name=name, reason=reason) for name, reason in missing.items()]
+        problems.append(
+            message(
+                "the packages are in {packages}, but FreeCAD cannot import them: {reasons}",
+                packages=place.packages,
+                reasons=joined("; ", reasons),
+            )
+        )
+    if failed:
+        problems.append(
+            message("{reason}. The add-on works without this package, but has no live events", reason=failed)
+        )
+    if problems:
+        raise ConfigError(joined("; ", problems))
+    return str(place.packages)
+
+
+def _pip(place: Installation) -> list[str]:
+    """Return how pip is run for this FreeCAD, with the options that choose packages for its Python."""
+    install = ["-m", "pip", "install", "--quiet", "--target", str(place.packages)]
     own = next((python for python in place.pythons if _has_pip(python, place.python)), None)
     if own is not None:  # FreeCAD's own knows which packages fit it, and which processor it is made for
-        command = [own, "-m", "pip", *install]
-    else:
-        command = [_any_python(), "-m", "pip", *install]
-        command += ["--python-version", version, "--implementation", "cp", "--only-binary=:all:"]
+        return [own, *install]
+    version = "{}.{}".format(*place.python)
+    chosen = ["--python-version", version, "--implementation", "cp", "--only-binary=:all:"]
+    return [_any_python(), *install, *chosen]
+
+
+def _install(place: Installation, pip: Sequence[str], names: Sequence[str]) -> str:
+    """Install packages by their import names; returns why that failed, "" if it did not."""
+    packages = [ALL_PACKAGES[name] for name in names]
+    command = [*pip, *packages]
+    # Packages there that cannot be imported, such as those for another Python, are useless.
+    if any((place.packages / name).exists() for name in names):
+        command.append("--upgrade")
     run = _run([*command, *_constraint(place)], _PIP_SECONDS)
     if (
         run.returncode and place.constraints
     ):  # the list is on the Internet, the packages may be on a server nearby
         run = _run(command, _PIP_SECONDS)
-    if run.returncode:
-        raise ConfigError(
-            message(
-                "pip could not install {names} for Python {version}: {run}",
-                names=", ".join(names),
-                version=version,
-                run=_pip_words(run),
-            )
-        )
-    missing = ask_freecad(place.command, place.data).missing
-    if missing:
-        reasons = "; ".join(
-            message("{name}: {reason}", name=name, reason=reason) for name, reason in missing.items()
-        )
-        raise ConfigError(
-            message(
-                "the packages are in {packages}, but FreeCAD cannot import them: {reasons}",
-                packages=place.packages,
-                reasons=reasons,
-            )
-        )
-    return str(place.packages)
+    if not run.returncode:
+        return ""
+    return message(
+        "pip could not install {names} for Python {version}: {run}",
+        names=", ".join(packages),
+        version="{}.{}".format(*place.python),
+        run=_pip_words(run),
+    )
 
 
 def _constraint(place: Installation) -> list[str]:
