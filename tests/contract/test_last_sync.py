@@ -152,6 +152,21 @@ def test_what_is_missing_is_a_line_of_every_export(api: Api) -> None:
     assert {row["name"] for row in export(api, top, "single") if not row["part_number"]} == {"Pin"}
 
 
+def test_a_gap_of_an_export_is_no_part_of_the_same_name(api: Api) -> None:
+    """It is not looked up by its name: a line that the file does not have is reported as missing."""
+    top, part = api.items(2)
+    name = f"Cover of {top}"
+    namesake = api.item(name=name)
+    merge(api, top, entries((part, 4, [])), left_out=[{**MISSING, "name": name}])
+    data = api.call("GET", bom(top, "export.csv")).body
+    assert name.encode() in data
+    api.add_line(top, namesake)
+    answer = api.good("POST", bom(top, "import?dry_run=1"), body=data)
+    assert [(row["part_number"], row["status"]) for row in answer["rows"]] == [(part, "same"), ("", "skip")]
+    assert answer["rows"][1]["name"] == name
+    assert [line["part_number"] for line in answer["missing"]] == [namesake]
+
+
 def test_an_export_with_gaps_can_be_imported_again(api: Api) -> None:
     """Rows that say what is missing are no lines of the BOM: the answer says that each was left out."""
     top, part = api.items(2)

@@ -3,13 +3,12 @@
 
 from __future__ import annotations
 
-import uuid
 from urllib.parse import quote
 
 import pytest
 from hunting import BOTH
 from model_file import model_file
-from server_testing import Api, bom
+from server_testing import Api, another_user, bom
 
 
 def releases(part_number: str, rest: str = "") -> str:
@@ -17,25 +16,10 @@ def releases(part_number: str, rest: str = "") -> str:
     return f"/api/items/{quote(part_number)}/releases{rest}"
 
 
-def user(api: Api, role: str = "editor", *, approver: bool = False) -> Api:
-    """Another caller, with a token of this user's own."""
-    name, password = "u" + uuid.uuid4().hex[:8], "correct horse battery"
-    api.good("POST", "/api/users", {"username": name, "role": role, "password": password})
-    if approver:
-        api.good("PUT", f"/api/users/{name}", {"approver": True})
-    session = api.as_(None).call("POST", "/api/auth/login", {"username": name, "password": password})
-    headers = {
-        "Cookie": session.headers["set-cookie"].partition(";")[0],
-        "X-CSRF-Token": session.json()["csrf_token"],
-    }
-    made = api.as_(None).good("POST", "/api/auth/tokens", {"name": "own"}, headers=headers)
-    return api.as_(made["token"])
-
-
 @pytest.fixture(name="boss")
 def _boss(api: Api) -> Api:
     """A viewer with the right to approve."""
-    return user(api, role="viewer", approver=True)
+    return another_user(api, role="viewer", approver=True)
 
 
 @pytest.fixture(name="product")
@@ -94,7 +78,7 @@ def test_what_is_frozen_stays_as_it_is(api: Api, boss: Api, product: tuple[str, 
 def test_only_the_right_to_approve_approves(api: Api, boss: Api, product: tuple[str, str, str]) -> None:
     """Neither the role of an admin nor a token that only reads; a withdrawal is an editor's."""
     top = product[0]
-    editor = user(api)
+    editor = another_user(api)
     editor.good("POST", releases(top), {"with_parts": True})
     for other in (api, editor):
         assert "may not approve" in other.bad(403, "POST", releases(top, "/A/approval"), {})["message"]

@@ -80,6 +80,8 @@ class BomRow:
         why it is no line; "" if it is one.
     doubt
         quantity and designators disagree, in words.
+    means_part
+        false for a row that means no part at all: a sum, an empty row, what an export left out.
     """
 
     line: int
@@ -89,6 +91,7 @@ class BomRow:
     problems: tuple[str, ...] = ()
     left_out: str = ""
     doubt: str = ""
+    means_part: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,6 +144,7 @@ def bom_rows(sheet: Sheet, mark: Mark | None = None) -> BomRows:
             {role: cell_at(row.cells, place) for role, place in at.items()},
             None,
             left_out=why[row.line],
+            means_part=False,
         )
         for row in sheet.rows
         if why[row.line]

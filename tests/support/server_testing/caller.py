@@ -244,6 +244,21 @@ class EventReader:
             fields[name] = value
 
 
+def another_user(api: Api, role: str = "editor", *, approver: bool = False) -> Api:
+    """Another caller, with a token of this user's own."""
+    name, password = "u" + uuid.uuid4().hex[:8], "correct horse battery"
+    api.good("POST", "/api/users", {"username": name, "role": role, "password": password})
+    if approver:
+        api.good("PUT", f"/api/users/{name}", {"approver": True})
+    session = api.as_(None).call("POST", "/api/auth/login", {"username": name, "password": password})
+    headers = {
+        "Cookie": session.headers["set-cookie"].partition(";")[0],
+        "X-CSRF-Token": session.json()["csrf_token"],
+    }
+    made = api.as_(None).good("POST", "/api/auth/tokens", {"name": "own"}, headers=headers)
+    return api.as_(made["token"])
+
+
 def bom(part_number: str, rest: str = "") -> str:
     """The path of a BOM, or of something below it."""
     path = f"/api/items/{quote(part_number, safe='')}/bom"

@@ -51,7 +51,7 @@ def name_of(texts: Mapping[str, str]) -> str:
 
 def identified(tx: Tx, rows: Sequence[BomRow]) -> list[IdentifiedRow]:
     """Find the part of each row."""
-    nameless = [row.texts for row in rows if not row.texts.get("part_number")]
+    nameless = [row.texts for row in rows if row.means_part and not row.texts.get("part_number")]
     row, by_name, by_maker = items.c, dict[str, list[str]](), dict[str, list[str]]()
     query = select(row.name, row.part_number).where(row.archived_at.is_(None)).order_by(row.part_number_key)
     for name, number in tx.conn.execute(query.where(one_of(tx, row.name, {*map(name_of, nameless)} - {""}))):
@@ -73,6 +73,8 @@ def _identified(
     maker, name = row.texts.get("manufacturer_part_number", ""), name_of(row.texts)
     if not (maker or name):
         return IdentifiedRow(row)
+    if not row.means_part:
+        return IdentifiedRow(row, unknown=maker or name)
     same = by_maker[maker] if maker else by_name.get(name, [])
     if len(same) == 1:
         return IdentifiedRow(row, same[0])
