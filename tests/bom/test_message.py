@@ -63,6 +63,11 @@ def test_values_appear_unchanged_and_survive_json_and_processes(file: str, other
         assert (again, again.template, again.said(German())) == (made, made.template, made.said(German()))
 
 
+def test_json_has_the_values_of_the_sentence_and_no_others() -> None:
+    made = Message("{n} line of {file}", {"n": 2, "file": "a", "obj": "L1"}, "{n} lines")
+    assert made.as_json()["values"] == {"n": 2, "file": "a"}
+
+
 def test_what_is_no_stored_message_is_none() -> None:
     for stored in ("a text", None, {"template": "{a}", "values": {}}, {"template": 1, "values": {}}):
         assert from_json(stored) is None

@@ -119,6 +119,12 @@ def test_which_options_exclude_another() -> None:
         *(("register", "--undeclare", option) for option in ("--declare", "--category", "--not-a-part")),
         *(("register", "--not-a-part", option) for option in ("--declare", "--category")),
         ("register", "--apply", "--category"),
+        *(
+            ("register", decided, option)
+            for decided in ("--count-hidden", "--reference")
+            for option in ("--declare", "--undeclare", "--not-a-part", "--category")
+        ),
+        *(("restore", "--test", option) for option in ("--replace-database", "--dry-run")),
         *(("restore", "--dry-run", option) for option in ("--replace-database", "--database", "--files")),
     }
 
@@ -129,7 +135,7 @@ def test_which_options_need_another() -> None:
     assert found == {
         ("register", "--yes", "--duplicates"),
         ("log", "--since", "--until"),
-        *(("order", "--csv --xlsx", option) for option in ("--kind", "--supplier")),
+        *(("order", "--csv --xlsx", option) for option in ("--kind", "--supplier", "--layout")),
         ("register", "--declare", "--apart"),
         *((command, "--strict", "--allow") for command in weighing),
         *(

@@ -143,7 +143,7 @@ def test_each_hidden_object_counts_or_not_by_one_word(run: Any, looked_into: Pat
     """The file keeps each answer, and nobody is asked about it again."""
     before = {"Terminal": "not counted", "Quiet": "counts", "Ref": "reference"}
     assert pieces(run, looked_into) == (1, {"Case"}, before)
-    done = run("register", looked_into, "--count", "Terminal +", "--count", "Ref", "--json")
+    done = run("register", looked_into, "--count-hidden", "Terminal +", "--count-hidden", "Ref", "--json")
     assert (done.code, done.json()) == (0, {"counted": ["Terminal", "Ref"], "references": []})
     counting = dict.fromkeys(before, "counts")
     assert pieces(run, looked_into) == (2, {"Case", "Terminal"}, counting)
@@ -151,18 +151,18 @@ def test_each_hidden_object_counts_or_not_by_one_word(run: Any, looked_into: Pat
     assert (done.code, "counts nowhere: Terminal +" in done.out) == (0, False)
     assert "Quiet, Terminal +" in done.out
     assert pieces(run, looked_into) == (1, {"Case"}, {"Ref": "counts"})
-    assert run("register", looked_into, "--count", "Quiet").code == 0
-    assert "says so already" in run("register", looked_into, "--count", "Quiet").out
+    assert run("register", looked_into, "--count-hidden", "Quiet").code == 0
+    assert "says so already" in run("register", looked_into, "--count-hidden", "Quiet").out
     assert pieces(run, looked_into)[0] == 2
 
 
 @pytest.mark.parametrize(
     "words",
     [
-        ("--count", "Case"),
+        ("--count-hidden", "Case"),
         ("--reference", "Nothing"),
-        ("--count", "Quiet", "--reference", "Quiet"),
-        ("--count", "Quiet", "--declare", "Case"),
+        ("--count-hidden", "Quiet", "--reference", "Quiet"),
+        ("--count-hidden", "Quiet", "--declare", "Case"),
     ],
 )
 def test_a_wrong_answer_about_hidden_objects_changes_nothing(

@@ -19,6 +19,7 @@ PART, GONE = f"{DEEP}/{LONG}.FCStd", f"{DEEP}/gone from {LONG}.FCStd"
 
 # What only programs read, and what people read in other words: a severity is a mark.
 MACHINE = {"code", "severity", "status", "state", "change", "silo_uuid", "item_type", "unit", "alike"}
+MACHINE |= {"template", "plural"}  # of a message, whose sentence has the values
 # The command in words, and what else of its JSON the text does not have: the label of a named item;
 # the object, if the name stands for it; the file of a finding, which its message has; what the caller typed.
 COMMANDS: dict[str, tuple[Sequence[str], set[str]]] = {

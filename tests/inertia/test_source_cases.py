@@ -114,12 +114,18 @@ def test_each_part_of_a_varying_material_has_its_own_uncertainty(
         assert found.part_number == number
 
 
-def test_pieces_of_a_varying_material_that_are_alike_are_one_part(
-    assemble: Fixture, compute: Fixture
+@pytest.mark.parametrize(
+    ("row", "code"), [("1,4,,rubber,,foot", "density_varies"), ("1,4,,steel,5.000 g,foot", "mass_differs")]
+)
+def test_pieces_that_are_alike_are_one_part_with_the_same_doubt(
+    assemble: Fixture, compute: Fixture, codes: Fixture, row: str, code: str
 ) -> None:
-    """An exporter writes each rubber foot as a product of its own, with the rounding of its place."""
+    """An exporter writes each rubber foot as a product of its own, with the rounding of its place; by how
+    much its mass may be wrong differs in the last bit.
+    """
     feet = [(f"l/foot{n}", cube("foot", 0.01 * (1 + n * 1e-13), key=f"foot{n}")) for n in range(4)]
-    report = compute(assemble(*feet), HEAD + "1,4,,rubber,,foot\n")
+    report = compute(assemble(*feet), HEAD + row + "\n")
+    assert codes(report) == [code]
     assert [one.quantity for one in report.links["l"].parts] == [4]
 
 

@@ -231,8 +231,8 @@ class FindingCode(StrEnum):
         "hidden",
         _I,
         "hidden pieces, counted or not",
-        "*Count It* or *Reference* in the preview; `silo-mod register TOP.FCStd --count OBJECT`, `--reference"
-        " OBJECT`. The file keeps the answer (`SiloBomExclude`)",
+        "*Count It* or *Reference* in the preview; `silo-mod register TOP.FCStd --count-hidden OBJECT`,"
+        " `--reference OBJECT`. The file keeps the answer (`SiloBomExclude`)",
         "Hidden in {obj}: {what}.",
     )
     MODIFIED_HERE = (

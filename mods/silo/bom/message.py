@@ -88,13 +88,22 @@ class Message(str):
         return filled(text, shown)
 
     def as_json(self) -> dict[str, Any]:
-        """Return template and values for JSON; values are messages, whole numbers or text."""
+        """Return template and values for JSON; values are messages, whole numbers or text. A value without
+        a place in the text stays out.
+        """
+        places = _places(self.template, self.plural)
         values = {
             name: value.as_json() if isinstance(value, Message) else value
             for name, value in self.values.items()
+            if name in places
         }
         more = {"plural": self.plural} if self.plural else {}
         return {"template": self.template, **more, "values": values}
+
+
+def _places(template: str, plural: str) -> set[str]:
+    """Return the names of the values that a sentence needs."""
+    return set(_PLACE.findall(template) + _PLACE.findall(plural)) | ({"n"} if plural else set())
 
 
 def _kept(value: object) -> str | int:
@@ -159,7 +168,7 @@ def from_json(stored: object) -> Message | None:
     if not isinstance(template, str) or not isinstance(plural, str) or not isinstance(values, Mapping):
         return None
     read = {str(name): from_json(value) or value for name, value in values.items()}
-    places = set(_PLACE.findall(template) + _PLACE.findall(plural)) | ({"n"} if plural else set())
+    places = _places(template, plural)
     counts = not plural or type(read.get("n")) is int
     return Message(template, read, plural) if places <= read.keys() and counts else None
 

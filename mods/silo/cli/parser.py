@@ -43,10 +43,27 @@ def _said_by_argparse(sentence: str) -> str:
     if isinstance(sentence, Message):
         return sentence
     for text in _ARGPARSE:
-        places = re.sub(r"\\\{(\w+)\\\}", r"(?P<\1>.+?)", re.escape(text))
-        if found := re.fullmatch(places, sentence, re.DOTALL):
-            return Message(text, found.groupdict())
+        if (values := _values(text, sentence)) is not None:
+            return Message(text, values)
     return sentence
+
+
+def _values(text: str, sentence: str) -> dict[str, str] | None:
+    """Return what stands in each place of a template, the shortest values first; None if the sentence is not
+    made of the template. The time is linear, for the words of a command line may be anything.
+    """
+    first, *rest = re.split(r"\{(\w+)\}", text)
+    if not sentence.startswith(first):
+        return None
+    values, start = {}, len(first)
+    for name, behind in zip(rest[::2], rest[1::2], strict=True):
+        is_last = name == rest[-2]
+        end = len(sentence) - len(behind) if is_last else sentence.find(behind, start + 1)
+        if end <= start or not sentence.startswith(behind, end):
+            return None
+        values[name] = sentence[start:end]
+        start = end + len(behind)
+    return values if start == len(sentence) else None
 
 
 class _Help(argparse.RawDescriptionHelpFormatter):

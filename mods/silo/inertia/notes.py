@@ -59,9 +59,15 @@ class Note:
     reader's own word.
 
     kg
-        by how much the mass of one piece may be wrong [kg]; None: by all of it.
+        by how much the mass of one piece may be wrong [kg], to six digits: the notes of pieces that are
+        alike up to the last bit are equal, so the pieces stay one part of the report. None: by all of it.
     """
 
     code: str
     message: str
     kg: float | None = None
+
+    def __post_init__(self) -> None:
+        """Round ``kg``."""
+        if self.kg is not None:
+            object.__setattr__(self, "kg", float(f"{self.kg:.6g}"))

@@ -38,7 +38,16 @@ if TYPE_CHECKING:
 
 def add_register(parser: argparse.ArgumentParser) -> None:
     """Add the command."""
-    add_top(parser, "--plan", "--apply", "--declare", "--undeclare", "--not-a-part", "--count", "--reference")
+    add_top(
+        parser,
+        "--plan",
+        "--apply",
+        "--declare",
+        "--undeclare",
+        "--not-a-part",
+        "--count-hidden",
+        "--reference",
+    )
     how = parser.add_mutually_exclusive_group()
     add_options(
         how,
@@ -104,7 +113,7 @@ def add_register(parser: argparse.ArgumentParser) -> None:
                     "keeps that"
                 )
             ),
-            "--count OBJECT...": message("count a hidden object (name or label); the file keeps that"),
+            "--count-hidden OBJECT...": message("count a hidden object (name or label); the file keeps that"),
             "--reference OBJECT...": message(
                 "say of a hidden object that it counts nowhere; the file keeps that"
             ),
@@ -116,7 +125,7 @@ def add_register(parser: argparse.ArgumentParser) -> None:
     not_with(parser, "--undeclare", "--declare", "--category", "--not-a-part")
     not_with(parser, "--not-a-part", "--declare", "--category")
     not_with(parser, "--apply", "--category")
-    for option in ("--count", "--reference"):
+    for option in ("--count-hidden", "--reference"):
         not_with(parser, option, "--declare", "--undeclare", "--not-a-part", "--category")
 
 
@@ -125,7 +134,7 @@ def run_register(args: argparse.Namespace) -> int:
     taken = args.undeclare or args.not_a_part
     if args.orphans:
         return orphans(args)
-    decided = args.count or args.reference
+    decided = args.count_hidden or args.reference
     if not (args.yes or args.adopt or args.plan or args.apply or taken or decided or sys.stdin.isatty()):
         raise InputError(
             message(
@@ -138,7 +147,7 @@ def run_register(args: argparse.Namespace) -> int:
     if (args.declare or taken or decided) and (args.plan or args.apply or os.path.isdir(args.top)):
         raise InputError(
             message(
-                "--declare, --undeclare, --not-a-part, --count and --reference are for one file, "
+                "--declare, --undeclare, --not-a-part, --count-hidden and --reference are for one file, "
                 "and not for a table"
             )
         )

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """``silo-mod register --declare``, ``--undeclare``, ``--not-a-part``: parts modelled in an assembly file; and
-``--count``, ``--reference``: if a hidden object counts.
+``--count-hidden``, ``--reference``: if a hidden object counts.
 """
 
 from __future__ import annotations
@@ -89,9 +89,11 @@ def decide_hidden(args: argparse.Namespace) -> int:
     from silo.fcstd import answer
 
     asked = hidden_in(args.top, args.assembly)
-    wanted = {True: _chosen(asked, args.count), False: _chosen(asked, args.reference)}
+    wanted = {True: _chosen(asked, args.count_hidden), False: _chosen(asked, args.reference)}
     if both := {place.obj for place in wanted[True]} & {place.obj for place in wanted[False]}:
-        raise InputError(f"{', '.join(sorted(both))}: give --count or --reference, not both")
+        raise InputError(
+            message("{both}: give --count-hidden or --reference, not both", both=", ".join(sorted(both)))
+        )
     path = os.path.realpath(args.top)
     if not args.even_if_open and open_in_any().has_file(path):
         raise DocumentError(path, OPEN)
