@@ -119,7 +119,9 @@ def _print_order(order: OrderList) -> None:
             *(spoken(part.kind), part.part_number, part.name, f"{part.needed} {part.unit or ''}"),
             *(part.ordered, spoken(price), of.supplier, of.number),
             f"{part.cost or ''} {part.currency or ''}".strip(),
-            "; ".join((*map(spoken, part.remarks), *(file.name for file in part.files))),
+            "; ".join(
+                filter(None, (*map(spoken, (part.cost_from, *part.remarks)), *(f.name for f in part.files)))
+            ),
         )
         table.add_row(*(Text(plain(cell)) for cell in cells))
     if order.parts:
