@@ -123,7 +123,8 @@ def file_state(
     if newest is None:
         return FileState.NEW
     is_unedited = record is not None and record.sha256 == sha256
-    if not is_unedited and stands(sha256, origins, [newest], numbered).base is not None:
+    # Only the nearest origin may decide without the other revisions: a farther one may be a colleague's.
+    if not is_unedited and stands("", origins[:1], [newest], numbered).base is not None:
         return FileState.EDITED
     if not checksum_of(newest) and not any(map(numbered, (*origins, sha256))):
         # The server shows nothing to compare, so what was sent from here counts.
@@ -131,6 +132,8 @@ def file_state(
     if is_unedited:
         return FileState.NEWER
     base = stands(sha256, origins, revisions(), numbered).base
+    if base is not None and base.revision_number == newest.revision_number:
+        return FileState.EDITED
     return FileState.NEWER if base is not None and _is(base, sha256, numbered) else FileState.BOTH
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,9 +16,12 @@ from silo.api.files import Origin
 from silo.api.revisions import other_name
 from silo.api.wire import Revision
 from silo.bom.errors import RejectedError, RouteMissingError, UnreachableError
+from silo.file_state import FileState, file_state
 from silo.outbox.entry import UNKNOWN, Commit, Entry, State
-from silo.project_folder import write_record
+from silo.project_folder import record_of, write_record
 from silo.testing import FakeSilo
+from silo.workbench.colleagues.look import FileToCheck, look
+from silo.workbench.documents.opened import DocumentOrigin
 
 if TYPE_CHECKING:
     from vault import Vault
@@ -623,3 +627,23 @@ def test_a_server_that_checks_the_base_tells_of_no_conflict_afterwards(vault: Va
     vault.send()
     assert vault.files() == [b"one", b"theirs"]
     assert not any(told.undone for told in vault.told)
+
+
+def test_in_a_shared_folder_a_record_of_theirs_does_not_hide_what_they_committed(vault: Vault) -> None:
+    """The colleague commits from the same folder: its record is of theirs, the open document is of ours."""
+    sent(vault, b"one")
+    opened = DocumentOrigin(str(vault.top), None, sha(b"one"))
+    newest = theirs(vault, b"theirs", 1)
+    before = record_of(str(vault.top))
+    assert before is not None
+    vault.top.write_bytes(b"theirs")
+    record = replace(before, sha256=sha(b"theirs"), revision=newest.revision_number)
+    write_record(str(vault.top), record)
+    identity = vault.ids["Top"]
+    asked = [FileToCheck(str(vault.top), identity, opened)]
+    (found,) = look(vault.silo, vault.outbox, asked, lambda _path: None).values()
+    assert (found.revision, found.base) == (newest.revision_number, 1)
+    revisions = vault.silo.revisions(vault.number)
+    origins = (sha(b"one"), sha(b"theirs"))
+    state = file_state(sha(b"mine"), origins, record, newest, record.server, lambda: revisions)
+    assert state is FileState.BOTH

@@ -779,6 +779,8 @@ class Store(FileOrigins):
         record
             of the file, where the caller has read it: a file that has moved has it at another place.
         """
+        if sha256 == UNKNOWN:  # what was opened is no longer on the disk, which the record is of
+            return (UNKNOWN,)
         if record is _LOOK_FOR_IT:
             record = record_of(path) if path else None
         line = self.lineage(sha256)

@@ -125,8 +125,10 @@ class _CommitFile:
         def number(content: str) -> int | None:
             return outbox.known_revision(client.base_url, content, self.identity)
 
-        # The newest one decides it nearly always; an item may have hundreds.
-        if stands("", self.origins, client.revisions(self.part_number, newest=1), number).base is not None:
+        # The newest one decides it nearly always; an item may have hundreds. Only the nearest origin may
+        # decide so soon: the record of a shared folder may be of what a colleague committed since.
+        newest = client.revisions(self.part_number, newest=1)
+        if stands("", self.origins[:1], newest, number).base is not None:
             return None
         found = stands("", self.origins, client.revisions(self.part_number), number)
         return None if found.newer is None else found
