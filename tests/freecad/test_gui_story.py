@@ -92,6 +92,13 @@ def test_the_same_again_posts_nothing(day: Told) -> None:
     ]
 
 
+def test_each_file_below_is_the_same_in_silo(day: Told) -> None:
+    """The look after the commit has a line for each."""
+    _title, _top, *below = day["below"].splitlines()
+    assert len(below) == 4
+    assert all(line.endswith(": the same") for line in below)
+
+
 def test_a_person_reads_it_in_the_dock(day: Told) -> None:
     """The spec's box: title, counts, and what has no number."""
     assert day["dock_visible"]

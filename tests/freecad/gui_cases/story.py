@@ -81,10 +81,9 @@ def story() -> None:
     )
 
     # 2. The same again: nothing is posted.
-    events = len(pane())
     commit(docs["top"])
-    wait(lambda: settled() and len(pane()) > events)
-    tell(second=pane()[0])
+    wait(lambda: settled() and boxes("Committed: " + numbers["Top"]) and boxes("5 files of it are in Silo"))
+    tell(second=boxes("Committed: " + numbers["Top"])[0], below=boxes("5 files of it are in Silo")[0])
 
     # 3. What a person reads in the dock.
     one.dock.show_and_raise()
