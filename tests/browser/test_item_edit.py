@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from large_boms import fcstd_with_picture
+from model_file import model_file
 from playwright.sync_api import Page, expect
 from server_testing import Api, bom, form_body
 
@@ -141,7 +142,7 @@ def test_a_file_becomes_a_revision(api: Api, visit: Visit) -> None:
     for one in (page, late):
         one.goto(f"/items/{number}")
     for one, name in ((page, "first.FCStd"), (late, "late.FCStd")):
-        one.get_by_label("File for a new revision").set_input_files(
+        one.get_by_label("File: a new model or another file").set_input_files(
             {"name": name, "mimeType": "application/zip", "buffer": fcstd_with_picture(len(name))}
         )
         one.get_by_label("Comment").fill(f"<b>{name}</b>")
@@ -201,7 +202,7 @@ def test_what_a_program_wrote_can_be_edited(api: Api, visit: Visit) -> None:
     page.locator("#edit").get_by_role("button", name="Save", exact=True).click()
     expect(page.locator(".notice")).to_contain_text(f"{child} changed")
     line = api.lines(parent)[child]
-    assert (line["notes"], line["unit"], line["find_number"]) == (" n1\r\nn2\n", "m ", "2")
+    assert (line["notes"], line["unit"], line["find_number"]) == (" n1\r\nn2\n", "m", "2")
 
 
 def test_an_upload_refused_because_of_a_colleague_is_sent_again(
@@ -211,16 +212,16 @@ def test_an_upload_refused_because_of_a_colleague_is_sent_again(
     (number,) = api.items(1)
     page = visit("editor")
     page.goto(f"/items/{number}")
-    body, headers = form_body({"file": ("theirs.step", b"theirs"), "comment": "theirs"})
+    body, headers = form_body({"file": ("theirs.FCStd", model_file(b"theirs")), "comment": "theirs"})
     assert api.call("POST", f"/api/items/{number}/file", body=body, headers=headers).status == 201
-    mine = tmp_path / "mine.step"
-    mine.write_bytes(b"mine")
-    page.get_by_label("File for a new revision").set_input_files(mine)
+    mine = tmp_path / "mine.FCStd"
+    mine.write_bytes(model_file(b"mine"))
+    page.get_by_label("File: a new model or another file").set_input_files(mine)
     page.get_by_label("Comment").fill("wider")
     page.get_by_role("button", name="Upload").click()
     expect(page.get_by_role("alert")).to_contain_text("made revision 1 after you opened this page")
-    page.get_by_label("Choose mine.step again").set_input_files(mine)
+    page.get_by_label("Choose mine.FCStd again").set_input_files(mine)
     page.get_by_role("button", name="Send it now").click()
-    expect(page.locator(".notice")).to_contain_text("mine.step is revision 2")
+    expect(page.locator(".notice")).to_contain_text("mine.FCStd is revision 2")
     newest = api.get(f"/api/items/{number}/revisions")[0]
-    assert (newest["comment"], newest["file_name"]) == ("wider", "mine.step")
+    assert (newest["comment"], newest["file_name"]) == ("wider", "mine.FCStd")

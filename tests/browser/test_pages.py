@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from model_file import model_file
 from playwright.sync_api import Locator, Page, Route, expect
 from server_testing import Api, bom, form_body
 from settled import measured, wait_for_cursor
@@ -140,15 +141,15 @@ def test_the_tree_says_what_each_row_weighs_and_costs(machine: dict[str, str], v
     page = visit("viewer", java_script_enabled=False)
     page.goto(f"/items/{machine['machine']}")
     cells = row(page, machine["screw"]).locator("td.number")
-    expect(cells).to_have_text(["3", "6", "500 g", "3 kg", "2.00 EUR", "12.00 EUR"])
+    expect(cells).to_have_text(["10", "3", "6", "500 g", "3 kg", "2.00 EUR", "12.00 EUR"])
     expect(row(page, machine["module"]).locator("td.number")).to_have_text(
-        ["2", "2", "1.5 kg", "3 kg", "6.00 EUR", "12.00 EUR"]
+        ["10", "2", "2", "1.5 kg", "3 kg", "6.00 EUR", "12.00 EUR"]
     )
     expect(row(page, machine["plate"]).locator("td.number")).to_have_text(["1", "1", "–", "–", "–", "–"])
     page.get_by_label("For how many").fill("10")
     page.get_by_role("button", name="Show").click()
     expect(row(page, machine["screw"]).locator("td.number")).to_have_text(
-        ["3", "60", "500 g", "30 kg", "2.00 EUR", "120.00 EUR"]
+        ["10", "3", "60", "500 g", "30 kg", "2.00 EUR", "120.00 EUR"]
     )
     totals = page.locator(".totals").first
     expect(totals).to_contain_text("30 kg")
@@ -168,7 +169,7 @@ def test_a_partly_known_mass_is_no_mass(api: Api, visit: Visit) -> None:
     page = visit("viewer")
     page.goto(f"/items/{top}")
     expect(row(page, module).locator("td.number")).to_have_text(
-        ["2", "2", "≥ 2 kg", "≥ 4 kg", "≥ 3.00 EUR", "≥ 6.00 EUR"]
+        ["10", "2", "2", "≥ 2 kg", "≥ 4 kg", "≥ 3.00 EUR", "≥ 6.00 EUR"]
     )
 
 
@@ -206,13 +207,13 @@ def test_files_and_exports_are_downloads(
 ) -> None:
     """A revision's file comes back as it was sent; the exports are files with names."""
     number = machine["machine"]
-    body, headers = form_body({"file": ("plan.txt", b"as sent"), "comment": "first"})
+    body, headers = form_body({"file": ("plan.FCStd", model_file(b"as sent")), "comment": "first"})
     assert api.call("POST", f"/api/items/{number}/file", body=body, headers=headers).status == 201
     page = visit("viewer")
     page.goto(f"/items/{number}")
     with page.expect_download() as download:
-        page.get_by_label("Table of revisions").get_by_role("link", name="plan.txt").click()
-    assert Path(download.value.path()).read_bytes() == b"as sent"
+        page.get_by_label("Table of revisions").get_by_role("link", name="plan.FCStd").click()
+    assert Path(download.value.path()).read_bytes() == model_file(b"as sent")
     page.get_by_text("Export", exact=True).click()
     with page.expect_download() as download:
         page.get_by_role("link", name="all levels as CSV", exact=True).click()
