@@ -12,6 +12,7 @@ from uuid import NAMESPACE_URL, uuid5
 
 import numpy as np
 import trimesh
+from model_file import model_file
 from server_testing import Api, form_body
 
 from silo.drawing import Glb, cube, shaded
@@ -52,6 +53,7 @@ def use(
 
 def commit(api: Api, item: str, content: bytes, bodies: Mapping[str, Body], uses: Mapping[str, Any]) -> None:
     """Upload a file with its model. ``uses``: product → what it shows; the first is the file as a whole."""
+    content = model_file(content)
     form, headers = form_body({"file": ("machine.FCStd", content)})
     api.good("POST", f"/api/items/{item}/file", body=form, headers=headers)
     send_model(api, content, bodies, uses)
@@ -59,6 +61,7 @@ def commit(api: Api, item: str, content: bytes, bodies: Mapping[str, Body], uses
 
 def library(api: Api, content: bytes, held: Mapping[str, str]) -> None:
     """Upload a file of several items with its model. ``held``: a body of :data:`BODIES` → its item."""
+    content = model_file(content)
     items = [{"item": api.get(f"/api/items/{one}")["id"], "object": key} for key, one in held.items()]
     form, headers = form_body({"file": ("library.FCStd", content), "items": json.dumps(items)})
     document = uuid5(NAMESPACE_URL, "/".join(held.values()))
