@@ -50,9 +50,9 @@ def must_exist(*paths: str) -> None:
     if lost:
         raise InputError(
             message(
-                "{count} of {count1} files are not there; nothing was done",
+                "{count} of {total} files are not there; nothing was done",
                 count=len(lost),
-                count1=len(paths),
+                total=len(paths),
             ),
             lost,
         )

@@ -187,10 +187,10 @@ def checked_config(path: Path) -> dict[str, Any]:
         else:
             problems += [
                 message(
-                    "line {key}: unknown key {key1} in [server]{key2}",
-                    key=_line(path, key),
-                    key1=key,
-                    key2=_hint(key, _KEYS),
+                    "line {line}: unknown key {key} in [server]{hint}",
+                    line=_line(path, key),
+                    key=key,
+                    hint=_hint(key, _KEYS),
                 )
                 for key in value
                 if key not in _KEYS

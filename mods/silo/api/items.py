@@ -128,9 +128,9 @@ class ItemCalls(FileCalls):
                 # Taken as "not registered", the items of the other pages would be made once more.
                 raise RejectedError(
                     message(
-                        "{count} items: the answer has {count1}, and is not the whole",
+                        "{count} items: the answer has {answered}, and is not the whole",
                         count=len(some),
-                        count1=len(models),
+                        answered=len(models),
                     )
                 )
             return {uuid: models[_written(uuid)] for uuid in some if _written(uuid) in models}
@@ -372,9 +372,9 @@ class ItemCalls(FileCalls):
             if len(answer) != len(some):
                 raise ServerFaultError(
                     message(
-                        "wanted {count} lists of look-alikes, got {count1}",
+                        "wanted {count} lists of look-alikes, got {answered}",
                         count=len(some),
-                        count1=len(answer),
+                        answered=len(answer),
                     )
                 )
             return dict(zip(some, answer, strict=True))

@@ -34,10 +34,10 @@ def character_problem(text: str) -> str | None:
     if refused is None:
         return None
     return message(
-        "wanted text without control characters and non-characters, got U+{refused} as its "
-        "character {refused1}; type it again instead of pasting it",
-        refused=f"{ord(refused[0]):04X}",
-        refused1=refused.start() + 1,
+        "wanted text without control characters and non-characters, got U+{code} as its "
+        "character {position}; type it again instead of pasting it",
+        code=f"{ord(refused[0]):04X}",
+        position=refused.start() + 1,
     )
 
 

@@ -116,10 +116,10 @@ class FcstdObject:
         if name not in self.properties.numbers:  # a plain attribute, such as Name, is no property
             raise AttributeError(
                 message(
-                    "{typeid} {name} has no property {name2}",
+                    "{typeid} {obj} has no property {property}",
                     typeid=self.TypeId,
-                    name=self.Name,
-                    name2=repr(name),
+                    obj=self.Name,
+                    property=repr(name),
                 )
             )
         return getattr(self, name)
@@ -199,10 +199,10 @@ class FcstdObject:
         if raw is ABSENT or not isinstance(raw, _KINDS.get(name, object)):
             raise AttributeError(
                 message(
-                    "{name}: {typeid} {name2} has no such property with a plain value",
-                    name=name,
+                    "{property}: {typeid} {obj} has no such property with a plain value",
+                    property=name,
                     typeid=self.TypeId,
-                    name2=self.Name,
+                    obj=self.Name,
                 )
             )
         value = self._resolved(raw)

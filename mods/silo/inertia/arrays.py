@@ -19,10 +19,10 @@ def freeze(owner: object, **shapes: tuple[int, ...]) -> None:
         if array.shape != shape:
             raise InputError(
                 message(
-                    "{name}: wanted an array of shape {shape}, got {shape2}",
+                    "{name}: wanted an array of shape {wanted}, got {got}",
                     name=name,
-                    shape=shape,
-                    shape2=array.shape,
+                    wanted=shape,
+                    got=array.shape,
                 )
             )
         array.flags.writeable = False

@@ -91,10 +91,10 @@ def check_far_frames(report: InertiaReport, claims: Claims, task: Task) -> None:
             far[name] = distance
     if far:
         words = message(
-            "the frame of {far} lies {far1} m from the centre of mass, in an assembly of "
+            "the frame of {names} lies {distance} m from the centre of mass, in an assembly of "
             "about {size} m: are its origins in mm? URDFs and link maps are in m",
-            far=", ".join(far),
-            far1=f"{max(far.values()):.4g}",
+            names=", ".join(far),
+            distance=f"{max(far.values()):.4g}",
             size=f"{size:.3g}",
         )
         report.add_warning("", "", words, MassCode.FRAME_FAR)

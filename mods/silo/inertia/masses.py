@@ -396,10 +396,10 @@ def _rounding(given: GivenMass) -> Iterator[Note]:
         yield Note(
             MassCode.ROUNDED,
             message(
-                "the BOM's {mass} kg is rounded to ± {quantum} kg ({mass2})",
+                "the BOM's {mass} kg is rounded to ± {quantum} kg ({share})",
                 mass=f"{mass:.6g}",
                 quantum=f"{quantum:.3g}",
-                mass2=f"{quantum / mass:.0%}",
+                share=f"{quantum / mass:.0%}",
             ),
             quantum,
         )
@@ -454,12 +454,12 @@ def _against(given: GivenMass, volume: float, expected: Expectation) -> Iterator
     yield Note(
         MassCode.DIFFERS,
         message(
-            "the BOM says {kg} kg, but {words} times the volume gives {weight} kg ({kg3}); "
+            "the BOM says {kg} kg, but {material} times the volume gives {weight} kg ({difference}); "
             "the BOM's mass was used",
             kg=f"{given.kg:.6g}",
-            words=expected.words,
+            material=expected.words,
             weight=f"{weight:.6g}",
-            kg3=f"{weight / given.kg - 1:+.0%}",
+            difference=f"{weight / given.kg - 1:+.0%}",
         ),
         abs(weight - given.kg),
     )
@@ -484,12 +484,12 @@ def implausible(given: GivenMass, volume: float) -> Iterator[Note]:
     yield Note(
         MassCode.IMPLAUSIBLE,
         message(
-            "the BOM's {kg} kg in {volume} cm³ would be {volume2} kg/m³, {than}: is the "
+            "the BOM's {kg} kg in {volume} cm³ would be {density} kg/m³, {than}: is the "
             "unit, the decimal mark or the row wrong, or the shape a mere {shape} of the "
             "part? The BOM's mass was used",
             kg=f"{given.kg:.6g}",
             volume=f"{volume * 1000000.0:.4g}",
-            volume2=f"{given.kg / volume:.3g}",
+            density=f"{given.kg / volume:.3g}",
             than=than,
             shape=shape,
         ),

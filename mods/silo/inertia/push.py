@@ -117,9 +117,9 @@ def plan_push(
         different = sum(value not in values[:index] for index, value in enumerate(values))
         if part_number in unsure:
             reason = message(
-                "{part_number} has the part number {part_number1} as well, and no sure mass",
-                part_number=repr(unsure[part_number]),
-                part_number1=part_number,
+                "{part} has the part number {part_number} as well, and no sure mass",
+                part=repr(unsure[part_number]),
+                part_number=part_number,
             )
             push_items.append(Skipped(parts[0].name, reason))
         elif different > 1:

@@ -124,11 +124,11 @@ class MassProps:
         if self.frame and other.frame and self.frame != other.frame:
             raise InputError(
                 message(
-                    "these bodies are given in two frames ({frame}; {frame1}) and cannot be added; "
+                    "these bodies are given in two frames ({frame}; {other_frame}) and cannot be added; "
                     "bring one into the other's frame with transformed(T), or ask for all in the "
                     "assembly's frame",
                     frame=self.frame,
-                    frame1=other.frame,
+                    other_frame=other.frame,
                 )
             )
         return replace(combine((self, other)), frame=self.frame or other.frame)

@@ -86,9 +86,9 @@ def wrong_name(name: str, candidate: Candidate) -> str:
     try:
         name.encode("utf-8")
     except UnicodeEncodeError:
-        return message("name: {name} is no UTF-8; {as_utf_8}", name=repr(name), as_utf_8=AS_UTF_8)
+        return message("name: {name} is no UTF-8; {advice}", name=repr(name), advice=AS_UTF_8)
     if "\ufffd" in name:
-        return message("name: {name} has lost letters (�); {as_utf_8}", name=repr(name), as_utf_8=AS_UTF_8)
+        return message("name: {name} has lost letters (�); {advice}", name=repr(name), advice=AS_UTF_8)
     if len(name) > 200 or not name.isprintable():
         return message(
             "name: wanted one line of at most 200 characters that can be seen, got {name}",

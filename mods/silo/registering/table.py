@@ -266,7 +266,7 @@ def requests_of(rows: Sequence[TableRow], offer: Offer, base: str, api: Any, nam
             done += 1
         elif candidate is None and wanted:
             what = row.cells["standard"] or f"{row.cells['file']}#{row.cells['object']}"
-            hint = "" if what.isprintable() else message("; {as_utf_8}", as_utf_8=AS_UTF_8)
+            hint = "" if what.isprintable() else message("; {advice}", advice=AS_UTF_8)
             row_problems.append(message("{what} is no component here{hint}", what=what, hint=hint))
         problems += [message("line {line}: {words}", line=row.line, words=words) for words in row_problems]
     if problems:

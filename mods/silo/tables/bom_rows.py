@@ -129,9 +129,9 @@ def bom_rows(sheet: Sheet, mark: Mark | None = None) -> BomRows:
         if unit and texts.get(Heading.UNIT) and unit_of(unit) != unit_of(texts[Heading.UNIT]):
             problems.append(
                 message(
-                    "Quantity: is in {unit}, and the unit is {unit1}",
+                    "Quantity: is in {unit}, and the unit is {other_unit}",
                     unit=unit,
-                    unit1=repr(texts[Heading.UNIT]),
+                    other_unit=repr(texts[Heading.UNIT]),
                 )
             )
         if unit:

@@ -115,10 +115,10 @@ def line_texts(lines: Iterable[LineChange]) -> list[str]:
         elif line.old.quantity != line.new.quantity:
             texts.append(
                 message(
-                    "{name} {quantity} → {quantity2}",
+                    "{name} {before} → {after}",
                     name=name,
-                    quantity=f"{line.old.quantity:g}",
-                    quantity2=f"{line.new.quantity:g}",
+                    before=f"{line.old.quantity:g}",
+                    after=f"{line.new.quantity:g}",
                 )
             )
         else:

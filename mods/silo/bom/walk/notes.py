@@ -184,9 +184,9 @@ class Notes:
         self._notes[FindingCode.SAME_ARTICLE, f"{bom_entry.standard} {other.standard}"] = _Note(
             FindingCode.SAME_ARTICLE.severity,
             message(
-                "{standard} and {standard1} are the same article under two standards: two lines.",
+                "{standard} and {other_standard} are the same article under two standards: two lines.",
                 standard=bom_entry.standard,
-                standard1=other.standard,
+                other_standard=other.standard,
             ),
             users=places,
         )

@@ -75,11 +75,11 @@ def run_relink(args: argparse.Namespace) -> int:
             else message("now lead")
         )
         text = message(
-            "✓ {folder}: {links} {verb} to {folder3}",
-            folder=relative(relinked.path, folder),
+            "✓ {file}: {links} {verb} to {target}",
+            file=relative(relinked.path, folder),
             links=links,
             verb=verb,
-            folder3=relative(new, folder),
+            target=relative(new, folder),
         )
         out.print(plain(text), markup=False)
     return Exit.DONE

@@ -109,10 +109,10 @@ def _print(args: argparse.Namespace, answer: Mapping[str, Any]) -> None:
     left_out = sum(row["status"] == "skip" for row in rows) + len(answer.get("left_out", ()))
     wrong = sum(row["status"] == "error" for row in rows)
     sentence = message(
-        "{counts} added, {counts1} changed, {counts2} the same, {left_out} left out",
-        counts=counts["add"],
-        counts1=counts["change"],
-        counts2=counts["same"],
+        "{added} added, {changed} changed, {same} the same, {left_out} left out",
+        added=counts["add"],
+        changed=counts["change"],
+        same=counts["same"],
         left_out=left_out,
     )
     sentence += message(", {wrong} with problems", wrong=wrong) if wrong else ""

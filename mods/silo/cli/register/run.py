@@ -93,10 +93,10 @@ class RegisterRun:
         count = sum(not component.decided for component in self.found.candidates)
         print(
             message(
-                "{plan}: {count}. Edit it, then: {plan2}",
+                "{plan}: {count}. Edit it, then: {command}",
                 plan=self.args.plan,
                 count=counted(count, "row"),
-                plan2=proposed_again(self.args, "--apply", Path(self.args.plan)),
+                command=proposed_again(self.args, "--apply", Path(self.args.plan)),
             ),
             file=sys.stderr,
         )

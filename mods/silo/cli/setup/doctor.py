@@ -117,9 +117,9 @@ def _program() -> str:
             )
         )
     return message(
-        "{version}, Python {version1}",
+        "{version}, Python {python}",
         version=importlib.metadata.version("silo-mod"),
-        version1=sys.version.split()[0],
+        python=sys.version.split()[0],
     )
 
 

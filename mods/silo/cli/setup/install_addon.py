@@ -38,10 +38,10 @@ def run_install_addon(args: argparse.Namespace) -> int:
         print_json(report)
     else:
         text = message(
-            "{report}\nAdd-on:   {report1}\nPackages: {report2}",
-            report=report["freecad"],
-            report1=report["addon"],
-            report2=report["packages"],
+            "{freecad}\nAdd-on:   {addon}\nPackages: {packages}",
+            freecad=report["freecad"],
+            addon=report["addon"],
+            packages=report["packages"],
         )
         print(spoken(message("{text}\nStart FreeCAD again, and choose the workbench Silo.", text=text)))
     return Exit.DONE

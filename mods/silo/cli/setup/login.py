@@ -37,9 +37,9 @@ def run_whoami(args: argparse.Namespace) -> int:
     else:
         who = ", ".join(filter(None, (name, role)))
         text = message(
-            "{account} (from {account1}): {who}",
-            account=account["url"],
-            account1=account["from"],
+            "{server} (from {source}): {who}",
+            server=account["url"],
+            source=account["from"],
             who=who or message("this server does not say who you are"),
         )
         print(plain(spoken(text)))

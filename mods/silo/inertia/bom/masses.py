@@ -166,11 +166,11 @@ class MassReader:
         self._report(
             BomCode.AMBIGUOUS_MASS,
             message(
-                "the mass “{text}” was read as {kg} kg but could be {kg2} kg, and no other mass "
+                "the mass “{text}” was read as {kg} kg but could be {other_kg} kg, and no other mass "
                 "shows which mark is the decimal one; say so with --decimal",
                 text=text,
                 kg=f"{likely.kg:.9g}",
-                kg2=f"{unlikely.kg:.9g}",
+                other_kg=f"{unlikely.kg:.9g}",
             ),
             row.line,
             name,
@@ -201,12 +201,12 @@ class MassReader:
         counts = {row.quantity, table.total_quantity(row) or row.quantity}
         if not any(_agree(row, count, total) for count in counts):
             words = message(
-                "the total mass says {kg} kg, but {quantity} times {mass_kg} kg is {quantity3} "
+                "the total mass says {kg} kg, but {quantity} times {mass_kg} kg is {product_kg} "
                 "kg; the mass of one piece was used",
                 kg=f"{total.kg:.6g}",
                 quantity=f"{row.quantity:g}",
                 mass_kg=f"{row.mass_kg:.6g}",
-                quantity3=f"{row.mass_kg * row.quantity:.6g}",
+                product_kg=f"{row.mass_kg * row.quantity:.6g}",
             )
             self._report(BomCode.TOTAL_DIFFERS, words, row.line, row.name)
         return row

@@ -246,14 +246,14 @@ def _second_columns(sheet: Sheet) -> Iterator[BomWarning]:
             message(
                 "the columns “{ours}” and “{other}” both mean the {role}; “{ours}” was used, "
                 "though line {line} has “{used}” there and “{unused}” in the other. --column "
-                '"{role6}={other}" takes the other one',
+                '"{column}={other}" takes the other one',
                 ours=clash.ours,
                 other=clash.other,
                 role=clash.role.replace("_", " "),
                 line=sheet.rows[clash.row].line,
                 used=clash.used,
                 unused=clash.unused,
-                role6=clash.role,
+                column=clash.role,
             ),
             sheet.header_line,
         )

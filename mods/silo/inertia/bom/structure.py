@@ -60,9 +60,9 @@ def doubtful_items(rows: Sequence[BOMEntry]) -> Iterator[BomWarning]:
     for row in rows:
         if first.setdefault(row.item, row.line) != row.line and "." in row.item:
             words = message(
-                "the item number {item} stands in line {item1} as well (was it 1.10 for 1.1?)",
+                "the item number {item} stands in line {line} as well (was it 1.10 for 1.1?)",
                 item=row.item,
-                item1=first[row.item],
+                line=first[row.item],
             )
             yield BomWarning(
                 BomCode.FILE,

@@ -392,9 +392,7 @@ class Walk:
         key = product_key(file_of(obj), object_name(obj), "" if registered else designation, self.base)
         if copies is None or copies is obj:
             return key
-        return message(
-            "{key} as in {copies} of {copies2}", key=key, copies=object_name(copies), copies2=file_of(copies)
-        )
+        return message("{key} as in {obj} of {file}", key=key, obj=object_name(copies), file=file_of(copies))
 
     def _name(self, obj: Any) -> str:
         document = getattr(obj, "Document", None)

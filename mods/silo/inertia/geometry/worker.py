@@ -88,9 +88,9 @@ def with_complaints(reading: GeometryReading, lines: list[str]) -> GeometryReadi
     problem = Note(
         GeometryCode.READER,
         message(
-            "the geometry kernel complained {lines} while reading: {lines1}",
-            lines=counted(len(lines), "time"),
-            lines1=lines[0],
+            "the geometry kernel complained {times} while reading: {first}",
+            times=counted(len(lines), "time"),
+            first=lines[0],
         ),
     )
     assembly = replace(reading.assembly, problems=(*reading.assembly.problems, problem))

@@ -74,7 +74,7 @@ def _yaml(text: str, source: str) -> Any:
             lines = {k.value: k.start_mark.line + 1 for k, _ in node.value if isinstance(k, yaml.ScalarNode)}
             count = Counter(k.value for k, _ in node.value if isinstance(k, yaml.ScalarNode))
             twice.extend(
-                message("“{key}” (line {key1})", key=key, key1=lines[key])
+                message("“{key}” (line {line})", key=key, line=lines[key])
                 for key, n in count.items()
                 if n > 1
             )

@@ -46,7 +46,7 @@ def checked_density(value: float) -> float:
     if UNIT_NEEDED_BELOW <= value <= DENSEST:
         return value
     hint = (
-        message("; {value} g/cm³ are {value1} kg/m³", value=f"{value:g}", value1=f"{value * 1000:g}")
+        message("; {value} g/cm³ are {kg_per_m3} kg/m³", value=f"{value:g}", kg_per_m3=f"{value * 1000:g}")
         if 0.01 < value < UNIT_NEEDED_BELOW
         else ""
     )

@@ -131,10 +131,10 @@ def _checked(records: Iterable[_Record], factor: float | None, source: str) -> t
             if other is not row and other.density != row.density:
                 problems.append(
                     message(
-                        "“{alias}” has two densities, {density} and {density2} kg/m³",
+                        "“{alias}” has two densities, {density} and {other_density} kg/m³",
                         alias=alias,
                         density=f"{other.density:g}",
-                        density2=f"{row.density:g}",
+                        other_density=f"{row.density:g}",
                     )
                 )
     if problems:

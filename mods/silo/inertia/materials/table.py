@@ -57,10 +57,10 @@ class MaterialTable:
             return MaterialHit(card)
         doubt = message(
             "{doubt}; a FreeCAD card on this machine has that name, and its {density} kg/m³ "
-            "were used instead of the {density2} kg/m³ of {name}",
+            "were used instead of the {table_density} kg/m³ of {name}",
             doubt=answer.doubt,
             density=f"{card.density:g}",
-            density2=f"{answer.material.density:g}",
+            table_density=f"{answer.material.density:g}",
             name=answer.material.name,
         )
         return MaterialHit(card, doubt)
