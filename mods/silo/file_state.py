@@ -17,7 +17,6 @@ from enum import StrEnum
 
 from silo.api.revisions import Standing, checksum_of, standing
 from silo.api.wire import Revision
-from silo.bom.message import message
 from silo.checksums import seen_as
 from silo.project_folder import FileRecord
 
@@ -32,9 +31,7 @@ class FileState(StrEnum):
     BOTH = "both"  # edited here, and newer in Silo
     WAITING = "waiting"  # its commit is in the queue
     HELD = "held"  # its commit is in the queue, and a user decides
-    SET_BACK = message(
-        "server set back"
-    )  # to an older state: the file is of a revision that the server has lost
+    SET_BACK = "server set back"  # to an older state: the file is of a revision that the server has lost
     UNKNOWN = "unknown"  # of an item that this server does not have
 
 

@@ -306,8 +306,8 @@ class ItemCalls(FileCalls):
         return self._get(message("schema {name}", name=name), "schemas", name).mapping()
 
     def find_schema(self, wanted: str = USUAL_SCHEMA) -> str:
-        """Find the name of the part-number schema to use: the wanted one; for the usual one, which is not
-        chose, also the server's only one.
+        """Find the name of the part-number schema to use: the wanted one; if that is the usual one, also
+        the server's only one.
 
         Raises :class:`InputError` that lists the schemas if there are several others, or none.
         """

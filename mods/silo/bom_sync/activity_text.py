@@ -36,7 +36,7 @@ class MergeCount(StrEnum):
     ADDED = "added"
     CHANGED = "changed"
     UNREFERENCED = "unreferenced"
-    IN_CONFLICT = message("in conflict")
+    IN_CONFLICT = "in conflict"
 
 
 def headline(item: str, translate: Translate = english) -> str:

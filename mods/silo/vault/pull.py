@@ -47,7 +47,7 @@ class PullState(StrEnum):
     UPDATED = "updated"  # replaced an older revision
     EDITED = "edited"  # local edits that are not in Silo: not touched
     WAITING = "waiting"  # its commit is in the queue, and not in Silo yet: not touched
-    SET_BACK = message("server set back")  # it is of a revision that the server has lost: not touched
+    SET_BACK = "server set back"  # it is of a revision that the server has lost: not touched
     OVERWRITTEN = "overwritten"  # local edits, replaced at the user's word; a copy is kept
     OPEN = "open"  # FreeCAD has it open: not touched
 

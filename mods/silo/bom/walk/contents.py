@@ -8,7 +8,6 @@ from enum import Enum
 from typing import Any
 
 from silo.bom.key import Key
-from silo.bom.message import message
 from silo.bom.walk.kinds import COMPONENTS, Kind, is_named_assembly
 from silo.bom.walk.tree import Tree
 
@@ -26,9 +25,9 @@ class ObjectRole(Enum):
     SPARE = "spare"  # kept in a folder for later
     INSIDE = "inside"  # part of another component
     CONSTRUCTION = "construction"  # brings nothing
-    LEFT_OUT = message("left out")  # suppressed or excluded, itself or with what holds it
+    LEFT_OUT = "left out"  # suppressed or excluded, itself or with what holds it
     LOOSE = "loose"  # beside the assembly
-    MODIFIED = message("modified here")  # made of linked parts, which count
+    MODIFIED = "modified here"  # made of linked parts, which count
     REFERENCE = "reference"  # a hidden link that only supports other geometry
     HIDDEN = "hidden"  # geometry of this file that is hidden, and not asked for
 

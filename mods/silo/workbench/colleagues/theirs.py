@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 from silo.bom.compare.three_states import ThreeLines
 from silo.bom.items.naming import display_name
-from silo.bom.message import message
 from silo.workbench.words import counted, filled, plain, quantity, translate
 
 if TYPE_CHECKING:
@@ -23,7 +22,7 @@ class Choice(StrEnum):
     LEAVE = "leave"  # leave mine out of this commit
     OPEN = "open"  # open theirs beside mine
     TAKE = "take"  # take theirs; mine is kept aside
-    ON_TOP = message("on top")  # commit mine on top of theirs
+    ON_TOP = "on top"  # commit mine on top of theirs
 
 
 def choice_texts() -> dict[str, str]:
