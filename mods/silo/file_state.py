@@ -74,6 +74,17 @@ def stands(
     return found
 
 
+def stands_on_newest(
+    origins: Sequence[str], newest: Sequence[Revision], number: Callable[[str], int | None]
+) -> bool:
+    """Return True if the newest revision alone says what a file was made from: it is the nearest origin.
+
+    A farther origin says nothing without the other revisions: the record of a shared folder may be of what
+    a colleague committed since.
+    """
+    return stands("", origins[:1], newest, number).base is not None
+
+
 def is_seen(revision: Revision, seen: str) -> bool:
     """Return True if a revision is the one that a user has seen and decided about."""
     return bool(seen) and seen == seen_as(revision.revision_number, revision.file_checksum)
@@ -120,8 +131,7 @@ def file_state(
     if newest is None:
         return FileState.NEW
     is_unedited = record is not None and record.sha256 == sha256
-    # Only the nearest origin may decide without the other revisions: a farther one may be a colleague's.
-    if not is_unedited and stands("", origins[:1], [newest], numbered).base is not None:
+    if not is_unedited and stands_on_newest(origins, [newest], numbered):
         return FileState.EDITED
     if not checksum_of(newest) and not any(map(numbered, (*origins, sha256))):
         # The server shows nothing to compare, so what was sent from here counts.

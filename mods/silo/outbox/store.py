@@ -779,8 +779,6 @@ class Store(FileOrigins):
         record
             of the file, where the caller has read it: a file that has moved has it at another place.
         """
-        if sha256 == UNKNOWN:  # what was opened is no longer on the disk, which the record is of
-            return (UNKNOWN,)
         if record is _LOOK_FOR_IT:
             record = record_of(path) if path else None
         line = self.lineage(sha256)
@@ -810,6 +808,14 @@ class Store(FileOrigins):
         told = known.union(recorded, (entry.sha256 for entry in waiting))
         near = [content for content in line if content in told] + line[-1:]
         return tuple(dict.fromkeys([*near, *queued, *recorded, sha256]))
+
+    def document_origins(self, content: str, path: str, identity: str) -> tuple[str, ...]:
+        """Return what an open document was made from, the nearest first: the content that it was read from
+        or saved to, and what that was made from.
+        """
+        if content == UNKNOWN:  # the file has another content by now, and its record is of that
+            return (UNKNOWN,)
+        return tuple(dict.fromkeys((content, *self.origins(content, path, identity))))
 
     def bom(self, entry_id: int) -> tuple[str, str]:
         """Return the extraction and the merge request of an entry, as JSON; "" if there is none."""

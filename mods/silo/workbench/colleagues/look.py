@@ -54,8 +54,7 @@ def look(
     for check in files:
         if (item := items.get(check.identity)) is None:
             continue
-        content = check.base.settle()
-        origins = (content, *outbox.origins(content, check.path, check.identity))
+        origins = outbox.document_origins(check.base.settle(), check.path, check.identity)
         file = _CommitFile(check.path, item.part_number, check.identity, origins)
         if (stands := file.standing(client, outbox)) is not None:
             lines: tuple[ThreeLines, ...] = ()
@@ -120,15 +119,13 @@ class _CommitFile:
 
     def standing(self, client: SiloClient, outbox: Store) -> Standing | None:
         """Compare the file with the item's revisions; None if committing it would undo nothing."""
-        from silo.file_state import stands
+        from silo.file_state import stands, stands_on_newest
 
         def number(content: str) -> int | None:
             return outbox.known_revision(client.base_url, content, self.identity)
 
-        # The newest one decides it nearly always; an item may have hundreds. Only the nearest origin may
-        # decide so soon: the record of a shared folder may be of what a colleague committed since.
-        newest = client.revisions(self.part_number, newest=1)
-        if stands("", self.origins[:1], newest, number).base is not None:
+        # The newest one decides it nearly always; an item may have hundreds.
+        if stands_on_newest(self.origins, client.revisions(self.part_number, newest=1), number):
             return None
         found = stands("", self.origins, client.revisions(self.part_number), number)
         return None if found.newer is None else found

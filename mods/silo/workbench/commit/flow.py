@@ -339,9 +339,8 @@ class CommitFlow:
         base = documents.base(doc)
         as_saved = not is_edited(documents, doc) and not base.replaced
         content = sha256_of(commit.path) if as_saved else ""
-        made_from = base.settle()
-        origins = (made_from, *self._session.outbox.origins(made_from, commit.path, commit.identity))
-        return replace(commit, origin=" ".join(dict.fromkeys(origins)), sha256=content)
+        origins = self._session.outbox.document_origins(base.settle(), commit.path, commit.identity)
+        return replace(commit, origin=" ".join(origins), sha256=content)
 
     def send(self, doc: Any, comment: str) -> None:
         """Send a document that has just been saved, as it is."""

@@ -328,8 +328,7 @@ class RevisionFlow:
             if item is None:
                 raise NotFoundError(translate("Silo", "This server does not know the item of this document."))
             item_history = _history_of(client, item.part_number)
-            content = base.settle()
-            origins = (content, *outbox.origins(content, base.path, identity))
+            origins = outbox.document_origins(base.settle(), base.path, identity)
 
             def number(of: str) -> int | None:
                 return outbox.known_revision(client.base_url, of, identity)

@@ -28,7 +28,9 @@ def with_numbers(tx: Tx, parent: Item, changes: Sequence[LineRecord], kind: Chan
     """Give the new lines among the changes their numbers, and keep those of removed lines from reuse."""
     older = _unnumbered(tx, parent, changes) if kind is ChangeKind.MERGE and changes else []
     every = [*(change if kind in BY_HAND else _keeping(change) for change in changes), *older]
-    new = [change for change in every if _is_new(change, kind)]
+    new = sorted(
+        (change for change in every if _is_new(change, kind)), key=lambda change: change.position or 0
+    )
     gone_now = [change for change in changes if change.before is not None and change.after is None]
     if not new and not gone_now:
         return every
@@ -46,11 +48,10 @@ def with_numbers(tx: Tx, parent: Item, changes: Sequence[LineRecord], kind: Chan
     }
     asking = [
         NewLine(change.child_id, change.after.find_number if change.after else None, kind in BY_HAND)
-        for change in sorted(new, key=lambda change: change.position or 0)
+        for change in new
     ]
     numbers, left = give_numbers(asking, filter(None, there.values()), gone, tx.settings.find_number_step)
-    order = sorted(new, key=lambda change: change.position or 0)
-    given = {change.line_id: number for change, number in zip(order, numbers, strict=True)}
+    given = {change.line_id: number for change, number in zip(new, numbers, strict=True)}
     left = {number: part for number, part in left.items() if number not in there.values()}
     if left != before:
         text = dumps(left) if left else None
