@@ -566,7 +566,7 @@ class RunSummary:
             if self.base
             else ""
         )
-        return [f"{_examples(counted(len(lines), 'part'), lines)}{command}"]
+        return [joined("", (_examples(counted(len(lines), "part"), lines), command))]
 
     def _by_cause(self, sentences: Iterable[str]) -> list[FaultCause]:
         """Put sentences of one cause together, and those about one file at fault below it.

@@ -254,9 +254,9 @@ def error_of(reply: Reply, *, writing: bool = False) -> SiloError:
         return NotFoundError(message("{asked}: not found{detail}", asked=asked, detail=detail))
     if status == 409:
         if reported.code == NewerRevisionError.code and reported.revision is not None:
-            return NewerRevisionError(f"{asked}{detail}", reported.revision)
+            return NewerRevisionError(joined("", (asked, detail)), reported.revision)
         if reported.code == MissingRevisionError.code:
-            return MissingRevisionError(f"{asked}{detail}")
+            return MissingRevisionError(joined("", (asked, detail)))
         cycle = len(reported.path) > 1
         return (
             CycleError(reported.path)

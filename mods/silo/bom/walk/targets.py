@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from silo.bom.findings import FindingCode
-from silo.bom.message import message
+from silo.bom.message import joined, message
 from silo.bom.walk.arrays import array_count, elements, is_array
 from silo.bom.walk.document import (
     LinkProblem,
@@ -283,7 +283,7 @@ def _no_source(link: object, inspect: Inspect | None) -> LinkProblem:
             FindingCode.BROKEN_LINK, detail=message("the original of its changed copy is lost")
         )
     words = message("it is the original of a changed copy")
-    return replace(problem, detail=f"{problem.detail}; {words}" if problem.detail else words)
+    return replace(problem, detail=joined("; ", (problem.detail, words)) if problem.detail else words)
 
 
 def _file_of(obj: object) -> str:

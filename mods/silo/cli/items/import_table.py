@@ -121,7 +121,7 @@ def _print(args: argparse.Namespace, answer: Mapping[str, Any]) -> None:
             spoken(
                 message("{sentence}. Nothing was written.", sentence=sentence)
                 if args.check
-                else f"{sentence}."
+                else sentence + "."
             )
         )
     )

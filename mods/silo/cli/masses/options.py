@@ -165,7 +165,7 @@ def check_options(args: argparse.Namespace, *, asks_server: bool) -> None:
     for code in args.allow:
         if code not in known:
             unknown = message("--allow: there is no warning {code}", code=code)
-            raise InputError(f"{unknown}{did_you_mean(code, known)}")
+            raise InputError(unknown + did_you_mean(code, known))
     if args.mesh_unit is not None and args.mesh_unit not in MESH_UNITS:
         text = "--mesh-unit: wanted one of {known}, got {unit}"
         raise InputError(message(text, known=", ".join(MESH_UNITS), unit=args.mesh_unit))

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from silo.bom.message import message
+from silo.bom.message import joined, message
 from silo.bom.walk.document import relative
 from silo.cli.json_output import print_json
 from silo.cli.proposals import proposed_again
@@ -51,7 +51,8 @@ def articles_text(args: argparse.Namespace, articles: Sequence[Modelled], base: 
             else ""
         )
         label = plain(article.entry.label)
-        lines.append(f"  {article.entry.quantity} × {label} ({article.entry.object_name}{copies}{source})")
+        what = f"  {article.entry.quantity} × {label} ({article.entry.object_name}"
+        lines.append(joined("", (what, copies, source, ")")))
     if len(articles) > most:
         lines.append(message("  and {count} more; --json has them all", count=len(articles) - most))
     first = proposed_again(args, "--yes", "--declare", articles[0].entry.object_name)

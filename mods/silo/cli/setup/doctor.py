@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from silo import spoken
 from silo.bom.errors import ConfigError, Exit, ForbiddenError, NotFoundError, SiloError, counted, exit_of
-from silo.bom.message import message
+from silo.bom.message import joined, message
 from silo.cli.connection import client_of
 from silo.cli.json_output import print_json
 from silo.cli.options import add_options
@@ -175,8 +175,12 @@ def _addon(place: Installation) -> str:
     if not place.mod.exists():
         return message("not in {mod}: `silo-mod install-addon` puts it there", mod=place.mod)
     if place.missing:
-        lacks = ", ".join(
-            message("{name} ({reason})", name=name, reason=reason) for name, reason in place.missing.items()
+        lacks = joined(
+            ", ",
+            (
+                message("{name} ({reason})", name=name, reason=reason)
+                for name, reason in place.missing.items()
+            ),
         )
         them = "it" if len(place.missing) == 1 else "them"
         return message(
@@ -248,7 +252,7 @@ def _who(client: SiloClient) -> str:
     except NotFoundError:
         return message("the server does not say")
     writes = message(" (reads only: register, sync and push need an editor)") if user.role == "viewer" else ""
-    return f"{user.username}, {user.role}{writes}" if user.role else user.username
+    return joined("", (user.username, ", ", user.role, writes)) if user.role else user.username
 
 
 def _identities(client: SiloClient) -> str:

@@ -24,6 +24,6 @@ def run_help(args: argparse.Namespace) -> int:
     known = [name for names in THEMES.values() for name in names]
     if args.name not in known:
         text = message("there is no command {name}", name=args.name)
-        raise InputError(f"{text}{did_you_mean(args.name, known)}")
+        raise InputError(text + did_you_mean(args.name, known))
     command_parsers(build_parser((args.name,)))[args.name].print_help()
     return Exit.DONE

@@ -116,7 +116,7 @@ class SolidCount:
         ]
         text = joined(", ", (text, *more))
         if self.agrees:
-            return f"{text}."
+            return text + "."
         texts = [
             message(
                 "{label} ({why}: shown {shown}, explained {explained})",
@@ -127,7 +127,7 @@ class SolidCount:
             )
             for row in self.differences[:8]
         ]
-        return message("{text}. They differ; look at: {texts}.", text=text, texts=", ".join(texts))
+        return message("{text}. They differ; look at: {texts}.", text=text, texts=joined(", ", texts))
 
     def as_dict(self) -> dict[str, Any]:
         """Return the comparison as JSON values."""
