@@ -8,7 +8,6 @@ is that function, elsewhere the text stays as it is. What comes from files and s
 
 from __future__ import annotations
 
-import re
 import unicodedata
 from collections import Counter
 from collections.abc import Iterable
@@ -41,8 +40,12 @@ def translate(context: str, text: str, **values: object) -> str:
 
 
 def filled(text: str, **values: object) -> str:
-    """Put each value in the place of its ``{name}``. A name without a value stays, also inside a value."""
-    return re.sub(r"\{(\w+)\}", lambda name: str(values.get(name[1], name[0])), text)
+    """Fill a text in as a message is (:func:`silo.bom.message.filled`)."""
+    if not values:
+        return text
+    from silo.bom import message  # late: FreeCAD's start fills in nothing
+
+    return message.filled(text, values)
 
 
 def spoken(sentence: object) -> str:
