@@ -51,13 +51,13 @@ class Standing:
         )
         raise NewerRevisionError(
             message(
-                "{created_by} committed revision {revision_number} of {part_number}{f}, and this was "
+                "{created_by} committed revision {revision_number} of {part_number}{comment}, and this was "
                 "made from {made}. Sending it would undo that. Look at theirs; then send yours on top of "
                 "it, or discard it and take theirs",
                 created_by=newest.created_by or "Somebody",
                 revision_number=newest.revision_number,
                 part_number=part_number,
-                f=message(" ({comment})", comment=newest.comment) if newest.comment else "",
+                comment=message(" ({comment})", comment=newest.comment) if newest.comment else "",
                 made=made,
             ),
             newest.model_dump(mode="json", exclude={"properties", "links"}),

@@ -165,9 +165,7 @@ def read_quantity(text: str, mark: Mark | None = None, *, points_are_decimal: bo
     if reading.value is not None and not 0 < reading.value <= Decimal(LARGEST_QUANTITY):
         return NumberReading(
             None,
-            message(
-                "wanted a number above 0 and at most 1e9, got “{longest}”", longest=text.strip()[:LONGEST]
-            ),
+            message("wanted a number above 0 and at most 1e9, got “{text}”", text=text.strip()[:LONGEST]),
         )
     return reading
 

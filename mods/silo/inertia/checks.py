@@ -173,10 +173,10 @@ def _check_rooted(report: InertiaReport, assembly: Assembly, claims: Claims) -> 
         if paths:
             many = message("{count} pieces, ", count=len(paths)) if len(paths) > 1 else ""
             words = message(
-                "no first-level sub-assembly holds it ({many}{paths} kg); it is in the root link "
+                "no first-level sub-assembly holds it ({many}{kg} kg); it is in the root link "
                 "{root}. --loose or --links can say otherwise",
                 many=many,
-                paths=f"{part.mass * len(paths):.6g}",
+                kg=f"{part.mass * len(paths):.6g}",
                 root=root,
             )
             report.add_warning(root, part.name, words, MassCode.IN_ROOT_LINK)

@@ -192,16 +192,14 @@ def why(
         meant_by = did_you_mean(wanted, sorted(all_names - {""})) or "."
         raise InputError(
             message(
-                "{wanted} is not a part of {assembly_obj} itself{meant_by}",
+                "{wanted} is not a part of {assembly} itself{meant_by}",
                 wanted=repr(wanted),
-                assembly_obj=label_of(assembly_obj),
+                assembly=label_of(assembly_obj),
                 meant_by=meant_by,
             )
         )
     return [
-        message(
-            "{total} × {part} in {assembly_obj}:", total=total, part=part, assembly_obj=label_of(assembly_obj)
-        ),
+        message("{total} × {part} in {assembly}:", total=total, part=part, assembly=label_of(assembly_obj)),
         *lines,
     ]
 

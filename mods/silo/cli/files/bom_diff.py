@@ -138,10 +138,10 @@ def _title(change: AssemblyChange) -> str:
     if change.old and change.new and change.old.head.key != change.new.head.key:
         note = message("was {doc_path}", doc_path=change.old.head.doc_path)
     return message(
-        "{doc_path}: {head}{f}",
+        "{doc_path}: {head}{note}",
         doc_path=change.head.doc_path,
         head=_name(change.head),
-        f=message(" ({note})", note=note) if note else "",
+        note=message(" ({note})", note=note) if note else "",
     )
 
 
