@@ -105,14 +105,16 @@ def reconciled(
     assembly: Assembly, table: BomTable, matching: Matching, placed: Placed, pieces: Mapping[int, int]
 ) -> Reconciliation:
     """Compare the sums. ``pieces``: of each matched row, by its identity, how many the geometry has."""
-    more = tuple(_more_pieces(matching, pieces))
+    counts = list(_counts(matching, pieces))
+    more = [_other_count(*count) for count in counts if count[2] > count[1]]
+    fewer = [_other_count(*count) for count in counts if count[2] < count[1]]
     named = {one.name for one in more}
     again = [one for one in _at_one_place(assembly, placed, matching) if one.name not in named]
     return Reconciliation(
         bom_total(table),
         float(placed.mass.sum()),
         _estimated(placed),
-        tuple(_not_counted(table, matching, placed, pieces)),
+        (*_unused(table, matching, placed), *fewer),
         (*more, *again),
     )
 
@@ -151,9 +153,7 @@ def bom_total(table: BomTable) -> float | None:
     return sum(top) if top else None
 
 
-def _not_counted(
-    table: BomTable, matching: Matching, placed: Placed, pieces: Mapping[int, int]
-) -> Iterator[Difference]:
+def _unused(table: BomTable, matching: Matching, placed: Placed) -> Iterator[Difference]:
     counted_groups = {id(group.match.row) for group in placed.groups}
     for row in matching.unused:
         above = table.ancestors(row)
@@ -161,12 +161,6 @@ def _not_counted(
             yield Difference(
                 row.name, unused_kg(table, row), message("no part, BOM line {line}", line=str(row.line))
             )
-    for row, wanted, there in _counts(matching, pieces):
-        if there < wanted:
-            reason = message(
-                "{wanted} in the BOM, {there} in the geometry", wanted=f"{wanted:g}", there=str(there)
-            )
-            yield Difference(row.name, (wanted - there) * (row.mass_kg or 0.0), reason)
 
 
 def unused_kg(table: BomTable, row: BOMEntry) -> float:
@@ -175,13 +169,9 @@ def unused_kg(table: BomTable, row: BOMEntry) -> float:
     return (row.mass_kg or 0.0) * (1.0 if quantity is None else quantity)
 
 
-def _more_pieces(matching: Matching, pieces: Mapping[int, int]) -> Iterator[Difference]:
-    for row, wanted, there in _counts(matching, pieces):
-        if there > wanted:
-            reason = message(
-                "{wanted} in the BOM, {there} in the geometry", wanted=f"{wanted:g}", there=str(there)
-            )
-            yield Difference(row.name, (there - wanted) * (row.mass_kg or 0.0), reason)
+def _other_count(row: BOMEntry, wanted: float, there: int) -> Difference:
+    reason = message("{wanted} in the BOM, {there} in the geometry", wanted=f"{wanted:g}", there=str(there))
+    return Difference(row.name, abs(there - wanted) * (row.mass_kg or 0.0), reason)
 
 
 def _counts(matching: Matching, pieces: Mapping[int, int]) -> Iterator[tuple[BOMEntry, float, int]]:
