@@ -107,7 +107,8 @@ def test_the_fake_has_the_methods_of_the_client_with_the_same_arguments() -> Non
         }
 
     client, fake = methods(SiloClient), methods(FakeSilo)
-    # The fake has no connection, no pages, no orders, no pictures and no models, and reads no tables.
+    # The fake has no connection, no administrators, no pages, no orders, no pictures and no models, and
+    # reads no tables.
     own = {
         "begin_login",
         "close",
@@ -121,6 +122,7 @@ def test_the_fake_has_the_methods_of_the_client_with_the_same_arguments() -> Non
         "import_parts",
         "import_prices",
         "modules",
+        "system",
         "thumbnail",
     }
     assert set(client) - set(fake) == own

@@ -17,6 +17,8 @@ VIEWER, EDITOR, ADMIN = ROLES
 # The contract (silo-contract §1.1): reading is for viewers, changing for editors. These are the exceptions.
 PUBLIC = {f"{method} {path}" for method in ("GET", "OPTIONS") for path in ("/health", "/ready")}
 PUBLIC |= {"POST /api/auth/login"}
+# Public unless the site asks for a login (tests/server/test_system.py).
+PUBLIC |= {"GET /api/openapi.json"}
 # Asked last: after that, no credential of the caller lets in any more.
 ENDS_ALL = "POST /api/auth/logout-everywhere"
 OF_VIEWERS = {
