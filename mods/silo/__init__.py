@@ -41,10 +41,16 @@ def caption(text: str, language: str = "") -> str:
 
 
 def _language(chosen: str) -> str:
-    """Return the code of the language, "" for English."""
-    names = ("SILO_LANGUAGE", "LC_ALL", "LC_MESSAGES", "LANG")
-    language = chosen or next(filter(None, map(os.environ.get, names)), "en")
-    return "" if language.startswith(("en", "C")) else re.split("[_.@-]", language)[0]
+    """Return the code of the language, "" for English.
+
+    LANGUAGE counts as gettext has it: before the locale, but not beside a locale that is C.
+    """
+    if not (wanted := chosen or os.environ.get("SILO_LANGUAGE", "")):
+        names = ("LC_ALL", "LC_MESSAGES", "LANG")
+        locale = next(filter(None, map(os.environ.get, names)), "")
+        preferred = os.environ.get("LANGUAGE", "") if locale not in ("C", "POSIX") else ""
+        wanted = preferred.partition(":")[0] or locale or "en"
+    return "" if wanted.startswith(("en", "C")) else re.split("[_.@-]", wanted)[0]
 
 
 @cache

@@ -35,6 +35,7 @@ from silo.bom.errors import DocumentError, Exit, InputError, RemoteError, SiloEr
 from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.items.naming import display_name
 from silo.bom.message import Message, joined, message
+from silo.bom.system_refusals import why_refused
 from silo.bom.view.diff_rows import diff_json, diff_rows
 from silo.bom.view.folders import base_folder, project_folder, shorten
 from silo.bom.view.tree_json import entry_json, finding_json
@@ -714,7 +715,7 @@ class ReportFile:
 
     def _give_up(self, error: OSError) -> None:
         self.trouble = message(
-            "{path} could not be written to its end: {error}", path=self.path, error=error.strerror or error
+            "{path} could not be written to its end: {error}", path=self.path, error=why_refused(error)
         )
 
 

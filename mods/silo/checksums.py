@@ -7,6 +7,7 @@ import hashlib
 from pathlib import Path
 
 from silo.bom.errors import DocumentError
+from silo.bom.system_refusals import why_refused
 
 
 def content_hash(path: Path | str) -> str:
@@ -20,7 +21,7 @@ def sha256_of(path: str) -> str:
     try:
         return content_hash(path)
     except OSError as error:
-        raise DocumentError(path, error.strerror or str(error)) from error
+        raise DocumentError(path, why_refused(error)) from error
 
 
 def bare_checksum(checksum: str | None) -> str:

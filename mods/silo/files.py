@@ -12,6 +12,7 @@ from pathlib import Path
 
 from silo.bom.errors import ConfigError, InputError
 from silo.bom.message import message
+from silo.bom.system_refusals import why_refused
 from silo.platform.spelling import Spelling
 
 IGNORE_FILE = ".siloignore"
@@ -122,7 +123,9 @@ def _patterns(path: str) -> Check:
         lines = [line.removesuffix("\r") for line in text.split("\n")]
         spec = GitIgnoreSpec.from_lines(lines)
     except (OSError, ValueError) as error:
-        raise InputError(message("{path} cannot be read: {error}", path=path, error=error)) from error
+        raise InputError(
+            message("{path} cannot be read: {error}", path=path, error=why_refused(error))
+        ) from error
     return lambda name: spec.check_file(name).include
 
 

@@ -16,6 +16,7 @@ from typing import BinaryIO
 
 from silo.bom.errors import InputError
 from silo.bom.message import message
+from silo.bom.system_refusals import why_refused
 from silo.platform.locks import hold_lock, shows_locks
 from silo.platform.spelling import one_path
 from silo.platform.user_folders import cache_folder
@@ -54,7 +55,7 @@ def folder_lock(
         yield problem
         return
     except OSError as error:
-        problem = error.strerror or str(error)
+        problem = why_refused(error)
         inner = cache_folder() / "locks" / f"{hashlib.sha256(os.fsencode(path)).hexdigest()[:32]}.lock"
         try:
             inner.parent.mkdir(parents=True, exist_ok=True)

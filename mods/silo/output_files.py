@@ -186,8 +186,10 @@ def _cannot_be_written(output: Output) -> str:
     folder = os.path.dirname(path) or "."
     if not os.path.isdir(folder):
         return message("{path} cannot be written: there is no folder {folder}", path=path, folder=folder)
-    if os.path.isdir(path) or not os.access(path if os.path.exists(path) else folder, os.W_OK):
-        return message("{path} cannot be written: it is a folder, or may not be changed", path=path)
+    if os.path.isdir(path):
+        return message("{path} cannot be written: it is a folder; name a file in it", path=path)
+    if not os.access(path if os.path.exists(path) else folder, os.W_OK):
+        return message("{path} cannot be written: this user has no right to change it", path=path)
     return ""
 
 

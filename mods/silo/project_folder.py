@@ -22,6 +22,7 @@ from typing import Any
 
 from silo.bom.errors import DocumentError
 from silo.bom.message import message
+from silo.bom.system_refusals import why_refused
 from silo.folder_lock import folder_lock
 from silo.platform.memory_file import read_memory
 from silo.platform.spelling import one_path
@@ -195,5 +196,5 @@ def _note_own(noted: Mapping[str, FileRecord | None]) -> None:
             _write(path, files, mode=0o600)
     except OSError as error:
         raise DocumentError(
-            str(path), message("cannot be written ({error})", error=error.strerror or error)
+            str(path), message("cannot be written ({error})", error=why_refused(error))
         ) from error

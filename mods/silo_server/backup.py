@@ -42,6 +42,7 @@ from sqlalchemy import (
 from sqlalchemy.exc import SQLAlchemyError
 
 from silo.bom.errors import ConfigError, SiloError, listed
+from silo.bom.system_refusals import why_refused
 from silo.platform.whole_files import (
     nearest_folder,
     replace_patiently,
@@ -146,7 +147,7 @@ def back_up(settings: Settings, target: Path, report: Report = lambda _: None) -
             made_here = {"at": made.made_at, "target": str(target), "same_disk": same}
             put_state(tx, BACKED_UP, dumps(made_here))
     except OSError as error:
-        raise ConfigError(f"backup: {target} cannot be written: {error.strerror or error}") from error
+        raise ConfigError(f"backup: {target} cannot be written: {why_refused(error)}") from error
     return made
 
 
@@ -230,9 +231,7 @@ def restore(
                 with old.engine.connect() as reader, _exclusive(db) as writer:
                     _replace_rows(reader, Tx(writer, SYSTEM, utc_now(), settings), made, report)
     except OSError as error:
-        raise ConfigError(
-            f"restore: {settings.storage} cannot be written: {error.strerror or error}"
-        ) from error
+        raise ConfigError(f"restore: {settings.storage} cannot be written: {why_refused(error)}") from error
     return made
 
 
@@ -264,7 +263,7 @@ def try_restore(settings: Settings, source: Path, report: Report = lambda _: Non
             wrong += [checksum for checksum in sorted(kept) if not store.holds(checksum)]
     except OSError as error:
         raise ConfigError(
-            f"restore: no test beside {source}, for that folder cannot be written: {error.strerror or error}"
+            f"restore: no test beside {source}, for that folder cannot be written: {why_refused(error)}"
         ) from error
     if wrong:
         raise ConfigError(f"restore: after a test restore of {source} these differ: {listed(wrong)}")

@@ -35,6 +35,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from silo.bom.errors import ConfigError
+from silo.bom.system_refusals import why_refused
 from silo.platform.limits import allow_many_files
 from silo.platform.sockets import WORKERS_CAN_SHARE_A_SOCKET, own_the_port
 from silo.platform.whole_files import nearest_folder, scratch_folder
@@ -595,7 +596,7 @@ def _bind(host: str, port: int) -> socket.socket:
         sock.bind((host, port))
     except (OSError, OverflowError) as error:
         sock.close()
-        cause = getattr(error, "strerror", None) or "wanted a port from 0 to 65535"
+        cause = why_refused(error) if isinstance(error, OSError) else "wanted a port from 0 to 65535"
         raise ConfigError(f"cannot listen on {host}:{port}: {cause}; --port 0 takes a free one") from error
     sock.listen(2048)
     sock.set_inheritable(True)

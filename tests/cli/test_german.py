@@ -109,6 +109,9 @@ def test_the_order_list_is_german(german: None, run: Any, silo: Any, gearbox: Pa
         ({"LANG": "de_DE.UTF-8", "LC_ALL": "C.UTF-8"}, "not in Silo"),
         ({"LANG": "en_GB.UTF-8", "LC_MESSAGES": "de_AT"}, "nicht in Silo"),
         ({"LC_ALL": "de_DE", "SILO_LANGUAGE": "en"}, "not in Silo"),
+        ({"LANG": "en_US.UTF-8", "LANGUAGE": "de:en"}, "nicht in Silo"),
+        ({"LANG": "de_DE.UTF-8", "LANGUAGE": "en_GB:de"}, "not in Silo"),
+        ({"LANG": "C", "LANGUAGE": "de"}, "not in Silo"),
         ({"LANG": "fr_FR.UTF-8"}, "not in Silo"),
         ({}, "not in Silo"),
     ],
@@ -116,7 +119,7 @@ def test_the_order_list_is_german(german: None, run: Any, silo: Any, gearbox: Pa
 def test_the_language_is_that_of_the_environment(
     monkeypatch: pytest.MonkeyPatch, variables: dict[str, str], said: str
 ) -> None:
-    for name in ("SILO_LANGUAGE", "LC_ALL", "LC_MESSAGES", "LANG"):
+    for name in ("SILO_LANGUAGE", "LANGUAGE", "LC_ALL", "LC_MESSAGES", "LANG"):
         monkeypatch.delenv(name, raising=False)
     for name, value in variables.items():
         monkeypatch.setenv(name, value)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 import re
@@ -47,6 +48,70 @@ def test_bom_and_sync_agree_about_a_bad_file(run: Any, silo: Any, gearbox: Path)
     for command in ("bom", "sync"):
         assert run(command, bad).code == Exit.BAD_INPUT
         assert run(command, bad.parent).code == Exit.UNDONE
+
+
+@pytest.mark.usefixtures("synced")
+def test_a_folder_without_freecad_files_is_the_wrong_one(run: Any, silo: Any, gearbox: Path) -> None:
+    """Unless its files were there at the last commit: then they are gone, which is worth a report."""
+    empty = gearbox.parent.parent / "empty"
+    empty.mkdir()
+    for command in ("bom", "sync", "status", "commit", "diff", "register"):
+        done = run(command, empty, *(["--yes"] if command == "register" else []))
+        assert (done.code, done.out) == (Exit.BAD_INPUT, ""), done
+        assert "no FreeCAD files (*.FCStd) in" in done.err
+    assert run("commit", gearbox.parent).code == Exit.DONE
+    for file in gearbox.parent.rglob("*.FCStd"):
+        file.unlink()
+    done = run("status", gearbox.parent)
+    assert (done.code, "TopAssembly.FCStd" in done.out) == (Exit.UNDONE, True)
+
+
+@pytest.mark.usefixtures("synced")
+def test_a_sentence_is_said_once(run: Any, silo: Any) -> None:
+    """A server puts its only problem into its sentence, and beside it."""
+    done = run("order", "A01-0001", "--spares", "many")
+    assert (done.code, done.err.count("wanted a number")) == (Exit.BAD_INPUT, 1)
+
+
+def test_what_the_system_says_is_said_in_our_words(
+    run: Any, silo: Any, gearbox: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Commands by places that the system refuses: no sentence of the system's own is shown."""
+    monkeypatch.chdir(gearbox.parent)
+    places = {
+        "a file as folder": gearbox / "x.csv",
+        "too long": gearbox.parent / ("x" * 300),
+        "a folder": gearbox.parent,
+        "nowhere": gearbox.parent / "no" / "x.csv",
+        "a file": gearbox,
+    }
+    lines = (
+        "import parts @",
+        "sync @",
+        "bom TopAssembly.FCStd --csv @",
+        "bom . --index @",
+        "pull A01-0001 --into @",
+        "register . --apply @",
+        "backup @",
+        "restore @",
+        "relink TopAssembly.FCStd --from Gearbox.FCStd --to @",
+        "inertia @",
+        "mass TopAssembly.FCStd --bom @",
+        "mass TopAssembly.FCStd --materials @",
+        "links @",
+        f"inertia {ARM} --links @",
+        f"inertia {ARM} --urdf @",
+        "login http://127.0.0.1:9 --paste --ca @",
+        "bom-diff @ .",
+        "where-used parts/Gear.FCStd --root @",
+    )
+    system = {os.strerror(number) for number in errno.errorcode}
+    for line in lines:
+        for place in places.values():
+            done = run(*(place if word == "@" else word for word in line.split()))
+            said = done.out + done.err
+            assert not [text for text in system if text in said], (line, place, said)
+            assert "Errno" not in said, (line, place, said)
 
 
 @pytest.mark.usefixtures("synced")

@@ -190,7 +190,7 @@ def test_two_outputs_are_two_files(run: Any, desk: dict[str, Path], tmp_path: Pa
 
 @pytest.mark.usefixtures("synced")
 @pytest.mark.parametrize(
-    ("command", "option", "ending"), [one for one in OUTPUTS if one[1] not in ("--plan", "--index")]
+    ("command", "option", "ending"), [one for one in OUTPUTS if one[1] not in ("--plan", "--out", "--index")]
 )
 def test_a_report_of_last_night_is_replaced(
     run: Any, silo: Any, desk: dict[str, Path], tmp_path: Path, command: str, option: str, ending: str
@@ -207,6 +207,26 @@ def test_a_report_of_last_night_is_replaced(
     again = run(*words, option, target)
     assert again.code == first.code, again
     assert target.stat().st_mtime > 1
+
+
+def test_an_edited_link_map_stays(run: Any, desk: dict[str, Path], tmp_path: Path) -> None:
+    """A map is made to be edited; the same command line the next day is no reason to lose that."""
+    made = tmp_path / "map.yaml"
+    assert run("links", desk["ARM"], "--out", made).code == Exit.DONE
+    made.write_text(made.read_text("utf-8").replace("base_link", "pedestal"), "utf-8")
+    edited = made.read_bytes()
+    done = run("links", desk["ARM"], "--out", made)
+    assert (done.code, made.read_bytes()) == (Exit.BAD_INPUT, edited)
+    assert "may hold edits" in done.err
+
+
+def test_the_urdf_of_another_robot_stays(run: Any, desk: dict[str, Path], tmp_path: Path) -> None:
+    other = tmp_path / "cart.urdf"
+    other.write_text('<robot name="cart"><link name="base_link"/></robot>', "utf-8")
+    before = other.read_bytes()
+    done = run(*line("inertia", desk), "--urdf-out", other)
+    assert (done.code, other.read_bytes()) == (Exit.BAD_INPUT, before)
+    assert "the URDF of another robot, cart" in done.err
 
 
 def test_a_pipe_and_a_device_are_written(run: Any, desk: dict[str, Path]) -> None:

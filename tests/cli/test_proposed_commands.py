@@ -23,6 +23,7 @@ from silo.proposed_command import proposed
 
 # A name as people give them, and what shells do with such a name.
 FOLDER = "Robot arm; v2 $HOME 'new' `x`"
+FOLDERS = (FOLDER, "-Größe 5 (Säge & Maß)", "--json")
 
 
 @given(st.lists(st.text(st.characters(exclude_categories=["Cs", "Cc"]), max_size=12), min_size=1))
@@ -40,10 +41,10 @@ def test_a_report_shortens_no_proposed_command(tmp_path: Path) -> None:
     assert shorten(text, str(tmp_path)) == f"Top.FCStd is odd; {proposed('bom', path)} shows it"
 
 
-@pytest.fixture
-def moved(synced: Path, gearbox: Path, tmp_path: Path) -> Path:
+@pytest.fixture(params=FOLDERS)
+def moved(synced: Path, gearbox: Path, tmp_path: Path, request: pytest.FixtureRequest) -> Path:
     """A project in a folder with a bad name; six parts lie elsewhere now, under new names or the old ones."""
-    project = tmp_path / FOLDER
+    project = tmp_path / request.param
     shutil.move(gearbox.parent, project)
     hardware = project / "hard ware"
     hardware.mkdir()
@@ -65,10 +66,10 @@ def test_the_links_of_moved_files_are_led_to_them_as_proposed(
     report = tmp_path / "night"
     top = moved / "TopAssembly.FCStd"
     said = {
-        "sync": run("sync", moved.name, "--verbose").out,
+        "sync": run("sync", f"./{moved.name}", "--verbose").out,
         "bom": run("bom", top).out,
         "bom folder": run("bom", moved).out,
-        "bom resolve": run("bom", top.relative_to(tmp_path), "--resolve").out,
+        "bom resolve": run("bom", f"./{top.relative_to(tmp_path)}", "--resolve").out,
         "diff": run("diff", top).out,
         "diff folder": run("diff", moved).out,
         "sync file": run("sync", top, "--recursive").out,

@@ -28,6 +28,7 @@ from silo.api.revisions import standing
 from silo.api.wire import Revision
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import DocumentError, InputError
+from silo.bom.system_refusals import why_refused
 from silo.checksums import seen_as
 from silo.outbox.entry import Commit, Entry, State, new_key
 from silo.outbox.send import send_all
@@ -470,18 +471,25 @@ def test_a_disk_that_does_not_answer_is_no_damage(tmp_path: Path, document: Path
     silo, item = with_item()
     store = Moody(tmp_path / "outbox.sqlite3")
     store.error = OSError(number, os.strerror(number))
+    why = why_refused(store.error)
     key = new_key()
     held = store.hold(str(document), key)
     store.add(Commit(str(document), 1.0, identity=item, key=key, file=held))
     send_all(store, silo, force=True)
     (entry,) = store.entries()
-    assert (entry.state, os.strerror(number) in entry.reason) == (State.KEEPING, True)
+    assert (entry.state, why in entry.reason) == (
+        State.KEEPING,
+        True,
+    )
     store.error = None
     store.finish(key)
     store.error = OSError(number, os.strerror(number))
     report = send_all(store, silo, force=True)
     (entry,) = report.failed
-    assert (entry.state, os.strerror(number) in entry.reason) == (State.WAITING, True)
+    assert (entry.state, why in entry.reason) == (
+        State.WAITING,
+        True,
+    )
     store.error = None
     send_all(store, silo, force=True)
     assert (store.entries(), silo.revisions("A01-0001")[0].file_name) == ((), "Top.FCStd")
@@ -491,7 +499,7 @@ def test_without_a_second_name_the_disk_is_synced_at_once(tmp_path: Path, docume
     """Nothing is kept half, and the person still has the document open."""
     store = Moody(tmp_path / "outbox.sqlite3")
     store.error = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-    with pytest.raises(DocumentError, match=r"No space left.*nothing was kept, commit it again"):
+    with pytest.raises(DocumentError, match=r"the disk is full.*nothing was kept, commit it again"):
         store.add(commit(document))
     assert store.entries() == ()
 
@@ -511,7 +519,7 @@ def test_what_is_lost_is_reported_as_lost_also_where_its_row_cannot_go(
     """An OutboxError would be taken for a commit that is kept. The row that stays says what to do."""
     store = Stuck(tmp_path / "outbox.sqlite3")
     store.error = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-    with pytest.raises(DocumentError, match=r"No space left.*nothing was kept, commit it again"):
+    with pytest.raises(DocumentError, match=r"the disk is full.*nothing was kept, commit it again"):
         store.add(commit(document))
     store.error = None
     send_all(store, FakeSilo())
@@ -714,7 +722,7 @@ def test_a_folder_that_takes_nothing_is_listed_truthfully(
             lambda: looked.stage(commit(document)),
         ):
             with pytest.raises(
-                OutboxError, match=r"cannot be written \(Read-only.*2 commits in .* cannot be sent"
+                OutboxError, match=r"cannot be written \(the disk is read-only.*2 commits in .* cannot be sent"
             ):
                 write()
     descriptions = {path: path.read_bytes() for path in store.copies.iterdir()}
@@ -755,7 +763,7 @@ def test_a_disk_error_of_one_entry_stops_no_other(tmp_path: Path, document: Path
     report = send_all(store, silo)
     assert ([sent.part_number for sent in report.sent], report.stopped_by) == ([numbers[1]], None)
     (left,) = store.entries()
-    assert (left.part_number, left.state, os.strerror(errno.EIO) in left.reason) == (
+    assert (left.part_number, left.state, "the disk reports a fault" in left.reason) == (
         numbers[0],
         State.WAITING,
         True,

@@ -92,9 +92,9 @@ def test_what_is_no_revision_is_refused_by_name(repository: Path, text: str) -> 
 
 
 def test_a_folder_outside_any_repository_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="not a git repository"):
+    with pytest.raises(InputError, match="is in no git repository"):
         top_of(tmp_path)
-    with pytest.raises(InputError, match="not a git repository"):
+    with pytest.raises(InputError, match="is in no git repository"):
         top_of(tmp_path / "nowhere")
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="is not a folder"):

@@ -26,6 +26,7 @@ from silo.api.address import ServerAddress, same_server
 from silo.bom.errors import ConfigError, did_you_mean
 from silo.bom.message import joined, message
 from silo.bom.numbers import yes_or_no
+from silo.bom.system_refusals import why_refused
 from silo.platform.system import MODES_COUNT
 from silo.platform.user_folders import config_folder
 from silo.platform.whole_files import replacing
@@ -115,9 +116,9 @@ def load_config(path: Path) -> dict[str, Any]:
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ConfigError(
             message(
-                "{path}: the configuration cannot be read ({error}); mend or remove it",
+                "{path}: the configuration cannot be read ({error}); repair or remove it",
                 path=path,
-                error=error,
+                error=why_refused(error),
             )
         ) from error
 
@@ -151,7 +152,7 @@ def save_config(
             message(
                 "{path}: the configuration cannot be written ({error})",
                 path=path,
-                error=error.strerror or error,
+                error=why_refused(error),
             )
         ) from error
     return path

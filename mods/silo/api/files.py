@@ -31,6 +31,7 @@ from silo.api.wire import (
 from silo.bom.errors import ConflictError, DocumentError, RejectedError, RouteMissingError, ServerFaultError
 from silo.bom.message import message
 from silo.bom.numbers import whole_number
+from silo.bom.system_refusals import why_refused
 from silo.bom.text import with_allowed_characters
 from silo.file_kind import MODEL
 from silo.platform.whole_files import remove_patiently, replacing
@@ -432,6 +433,6 @@ def _write(path: Path, pieces: Iterator[bytes], total: int, on_progress: Progres
                     on_progress(done, max(total, done))
     except OSError as error:
         raise DocumentError(
-            str(path), message("cannot be written ({error})", error=error.strerror or error)
+            str(path), message("cannot be written ({error})", error=why_refused(error))
         ) from error
     return digest.hexdigest()

@@ -13,6 +13,7 @@ from typing import BinaryIO, Self
 from silo.api.transport import Cancel, stop_if
 from silo.bom.errors import DocumentError
 from silo.bom.message import message
+from silo.bom.system_refusals import why_refused
 
 _BLOCK = 1 << 18
 
@@ -133,5 +134,5 @@ class FileBody(FileForm):
 def _unreadable(path: Path, error: OSError) -> DocumentError:
     return DocumentError(
         str(path),
-        message("the file cannot be read ({error}); nothing was sent", error=error.strerror or error),
+        message("the file cannot be read ({error}); nothing was sent", error=why_refused(error)),
     )

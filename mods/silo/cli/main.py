@@ -18,6 +18,7 @@ from typing import Any
 from silo import spoken
 from silo.bom.errors import CancelledError, Exit, InputError, SiloError, exit_of
 from silo.bom.message import beside, message
+from silo.bom.system_refusals import why_refused
 from silo.cli.parser import build_parser
 from silo.cli.streams import OutputStream, open_streams
 
@@ -130,6 +131,8 @@ def _failed(error: SiloError, words: Sequence[str]) -> int:
         text if isinstance(error, CancelledError) else message("silo-mod: {text}", text=text), file=sys.stderr
     )
     for problem in getattr(error, "problems", ()):
+        if problem in text:  # a server may say its single problem in the sentence too
+            continue
         print(message("  - {problem}", problem=problem), file=sys.stderr)
     if "--json" in words and not getattr(sys.stdout, "begun", True):
         from silo.cli.json_output import print_json
@@ -153,7 +156,7 @@ def _refuse_empty(args: argparse.Namespace) -> None:
 def _system_said_no(error: OSError) -> InputError:
     """Describe why a file or the output cannot be written: no such folder, no right, a full disk."""
     what = error.filename or message("the output cannot be written")
-    return InputError(message("{what}: {error}", what=what, error=error.strerror or error))
+    return InputError(message("{what}: {error}", what=what, error=why_refused(error)))
 
 
 if __name__ == "__main__":

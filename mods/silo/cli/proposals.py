@@ -19,5 +19,6 @@ def proposed_again(args: argparse.Namespace, *words: str | Path) -> str:
         action = args.parser._option_string_actions.get(option)
         if action is None or (value := getattr(args, action.dest)) == action.default:
             continue
-        kept += [option] if action.nargs == 0 else [option, str(value)]
+        # With = a value that begins with a dash is no option.
+        kept += [option] if action.nargs == 0 else [f"{option}={value}"]
     return proposed(args.command, Path(args.top), *words, *kept)

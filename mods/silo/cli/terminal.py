@@ -65,5 +65,6 @@ def table_of(*titles: str) -> Table:
             justify="right" if title == "Quantity" else "left",
             overflow="fold",
             no_wrap=title == "Part number",
+            min_width=max((len(word) for word in spoken(title).split()), default=0),  # no heading breaks
         )
     return table

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 
 from silo.bom.findings import FindingCode
 from silo.bom.message import message
+from silo.bom.system_refusals import why_refused
 from silo.fcstd.errors import FcstdError
 from silo.fcstd.limits import Limits
 
@@ -281,7 +282,7 @@ class ContainerFile:
             while len(data) < length and (more := os.read(self._descriptor, length - len(data))):
                 data += more
         except OSError as error:
-            raise self._error(message("it cannot be read: {error}", error=_reason(error))) from error
+            raise self._error(message("it cannot be read: {error}", error=why_refused(error))) from error
         if len(data) < length:
             raise self._error(message("it is cut short"))
         return data
@@ -290,17 +291,13 @@ class ContainerFile:
         return FcstdError(self.path, reason, state=self.state)
 
 
-def _reason(error: Exception) -> str:
-    return getattr(error, "strerror", None) or str(error)
-
-
 def _open(path: str) -> int:
     try:
         return os.open(path, _FLAGS)
     except (FileNotFoundError, NotADirectoryError) as error:
         raise FcstdError(path, message("there is no such file"), FindingCode.MISSING_FILE) from error
     except (OSError, ValueError) as error:
-        raise FcstdError(path, message("it cannot be opened: {error}", error=_reason(error))) from error
+        raise FcstdError(path, message("it cannot be opened: {error}", error=why_refused(error))) from error
 
 
 class Inflater:

@@ -16,6 +16,7 @@ from typing import BinaryIO
 
 from silo.bom.errors import DocumentError
 from silo.bom.message import message
+from silo.bom.system_refusals import why_refused
 from silo.fcstd.container import ContainerFile, FileStat, ZipEntry, document_xml
 from silo.fcstd.errors import FcstdError
 from silo.fcstd.limits import Limits
@@ -87,7 +88,7 @@ def replace_file(path: str, state: FileStat, content: Iterable[Piece], check: Ca
         _write(path, state, content, check)
     except OSError as error:
         raise DocumentError(
-            path, message("it cannot be written: {error}", error=error.strerror or error)
+            path, message("it cannot be written: {error}", error=why_refused(error))
         ) from error
 
 

@@ -27,6 +27,7 @@ from silo.bom.entry import Extraction
 from silo.bom.errors import ConfigError, DocumentError, InputError, SiloError
 from silo.bom.message import message
 from silo.bom.snapshot import from_plain
+from silo.bom.system_refusals import why_refused
 from silo.freecads.places import commands, exchange_folder, start
 from silo.platform import processes
 from silo.platform.whole_files import scratch_folder
@@ -245,7 +246,7 @@ class FreeCADRun:
                 message(
                     "{freecadcmd} cannot be started: {error}",
                     freecadcmd=self.freecadcmd,
-                    error=error.strerror or error,
+                    error=why_refused(error),
                 )
             ) from error
         return self

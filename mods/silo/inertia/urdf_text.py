@@ -20,6 +20,7 @@ import numpy as np
 
 from silo.bom.errors import InputError
 from silo.bom.message import message
+from silo.bom.system_refusals import why_refused
 from silo.inertia.arrays import Floats
 from silo.inertia.links.claims import ROOT_LINK
 from silo.inertia.links.frames import MOST_RAD, origin_frame
@@ -70,7 +71,9 @@ def read_bytes(path: Path | str) -> bytes:
             raise InputError(f"{path}: larger than {MAX_BYTES // 2**20} MB, which no URDF is")
         data = Path(path).read_bytes()
     except OSError as error:
-        raise InputError(f"{path}: the URDF cannot be read ({error.strerror or error})") from error
+        raise InputError(
+            message("{path}: the URDF cannot be read ({error})", path=path, error=why_refused(error))
+        ) from error
     return expanded(Path(path)) if is_xacro(data) else data
 
 

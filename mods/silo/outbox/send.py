@@ -47,6 +47,7 @@ from silo.bom.errors import (
 )
 from silo.bom.message import message
 from silo.bom.snapshot import from_plain
+from silo.bom.system_refusals import why_refused
 from silo.bom.view.folders import project_folder
 from silo.bom_sync.held import report_held, why_held
 from silo.bom_sync.memory import server_of
@@ -505,7 +506,7 @@ class _SendRun:
                 message("{file_name}: {text}discard this", file_name=entry.path or entry.file_name, text=text)
             ) from error
         except OSError as error:
-            raise self._unreadable(entry, error.strerror or str(error)) from error
+            raise self._unreadable(entry, why_refused(error)) from error
 
     def _unreadable(self, entry: Entry, reason: str) -> _PassingError:
         # This is an error of the disk, not damage: the hash of a damaged copy differs.

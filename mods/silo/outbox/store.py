@@ -36,6 +36,7 @@ from silo.api.pause import Pause
 from silo.bom.errors import ConflictError, DocumentError, InputError, counted
 from silo.bom.message import Message, message
 from silo.bom.snapshot import to_plain
+from silo.bom.system_refusals import why_refused
 from silo.checksums import content_hash
 from silo.folder_lock import folder_lock
 from silo.outbox.entry import ASKED, SAME_PART, UNKNOWN, Commit, CommitFields, Entry, State, on_top
@@ -187,7 +188,7 @@ class QueueDatabase:
                     "{path}: the outbox cannot be written ({error}). {text}; make room or fix the "
                     "permissions, then {again}",
                     path=self.path,
-                    error=error.strerror or error,
+                    error=why_refused(error),
                     text=text,
                     again=again,
                 )
@@ -258,7 +259,7 @@ class QueueDatabase:
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         except OSError as error:
             raise DocumentError(
-                str(folder), message("cannot be made ({error})", error=error.strerror or error)
+                str(folder), message("cannot be made ({error})", error=why_refused(error))
             ) from error
         return folder / f"{time.strftime('%H%M%S')}-{time.monotonic_ns() % 10**6}-{os.path.basename(path)}"
 
@@ -411,7 +412,7 @@ class FileOrigins(QueueDatabase):
             return None
         except OSError as error:
             text = message(
-                "no copy of it could be kept ({error}); it was not replaced", error=error.strerror or error
+                "no copy of it could be kept ({error}); it was not replaced", error=why_refused(error)
             )
             raise DocumentError(path, text) from error
         return target
@@ -587,7 +588,7 @@ class Store(FileOrigins):
             now = self.by_key(key)
             if now is None or now.sha256:  # another program was quicker
                 return
-            sentence = message("cannot be copied for sending ({error})", error=error.strerror or error)
+            sentence = message("cannot be copied for sending ({error})", error=why_refused(error))
             if held is not None or content is copy:
                 self.update(
                     entry.id,
@@ -682,7 +683,7 @@ class Store(FileOrigins):
                 shutil.copyfileobj(read, out, _BLOCK)
         except OSError as error:
             raise DocumentError(
-                str(target), message("cannot be written ({error})", error=error.strerror or error)
+                str(target), message("cannot be written ({error})", error=why_refused(error))
             ) from error
 
     # -- pauses -----------------------------------------------------------------------------------------

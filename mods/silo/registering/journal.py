@@ -25,6 +25,7 @@ from typing import Any
 from silo.bom.entry import BomEntry
 from silo.bom.errors import InputError
 from silo.bom.message import message
+from silo.bom.system_refusals import why_refused
 from silo.folder_lock import folder_lock
 from silo.platform.user_folders import data_folder
 from silo.platform.whole_files import private_file, private_folder, remove_patiently, replacing
@@ -218,7 +219,7 @@ class Turn:
             except FileNotFoundError:  # no such folder: nothing else is in it
                 pass
             except OSError as error:
-                self.unseen = error.strerror or str(error)
+                self.unseen = why_refused(error)
         return record, begun
 
     def replace(self, item_id: str) -> None:

@@ -15,6 +15,7 @@ from typing import Any, BinaryIO
 
 from silo.bom.errors import InputError
 from silo.bom.message import message
+from silo.bom.system_refusals import why_refused
 from silo.platform.locks import hold_lock
 from silo.platform.whole_files import remove_patiently
 
@@ -143,7 +144,7 @@ class IndexDatabase:
             self.trouble = message(
                 "the index {path} cannot be used ({error}); nothing is lost but time",
                 path=self.path,
-                error=error,
+                error=why_refused(error),
             )
             log.warning("%s", self.trouble)
         self.writes = False

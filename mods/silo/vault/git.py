@@ -29,6 +29,7 @@ from silo.platform.whole_files import remove_patiently
 
 _CHUNK = 1 << 20
 _POINTER = re.compile(rb"version https://git-lfs\.github\.com/spec/v1\n(?:.*\n)*?oid sha256:([0-9a-f]{64})\n")
+_NO_REPOSITORY = 128  # what git ends with where it finds none
 _POINTER_SIZE = 1024  # by the Git LFS specification
 _FILES = (b"100644", b"100755")
 _LINK, _SUBMODULE = b"120000", b"160000"
@@ -289,6 +290,13 @@ def _git(repository: str, *words: str) -> bytes:
         command, cwd=repository, env=_environment(), capture_output=True, check=False, **child_options()
     )
     if done.returncode:
+        if done.returncode == _NO_REPOSITORY and "--is-bare-repository" in words:
+            raise InputError(
+                message(
+                    "{folder} is in no git repository; name a folder inside it, or run this there",
+                    folder=repository,
+                )
+            )
         said = done.stderr.decode(errors="replace").strip() or _no_answer(repository, words)
         what = f"{words[0]} {words[-1].removesuffix('^{commit}')}"
         raise InputError(

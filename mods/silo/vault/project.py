@@ -176,6 +176,12 @@ def find_project(tops: Sequence[str], root: str | None = None) -> Project:
     return Project(common)
 
 
+def must_hold_files(tops: Sequence[str], project: Project) -> None:
+    """Raise InputError if there is no FreeCAD file, and there was none: the folder is the wrong one."""
+    if not documents_in(tops) and not project.records():
+        raise InputError(message("no FreeCAD files (*.FCStd) in {tops}", tops=", ".join(tops)))
+
+
 def read_project(tops: Sequence[str], project: Project, *, hardware: bool = True) -> Belonging:
     """Read what belongs to a commit of these files or folders. Changes nothing."""
     paths = [one_path(path) for path in documents_in(tops)]

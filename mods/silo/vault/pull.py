@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 from silo.api.address import canonical
 from silo.bom.errors import DocumentError
 from silo.bom.message import message
+from silo.bom.system_refusals import why_refused
 from silo.checksums import content_hash
 from silo.fcstd import Library
 from silo.fcstd.linked import identity_in
@@ -299,7 +300,7 @@ def _place(one: Fetched, target: Path, rules: Rules) -> PulledFile:
             shutil.copyfileobj(read, write, 1 << 20)
     except OSError as error:
         raise DocumentError(
-            str(target), message("cannot be written ({error})", error=error.strerror or error)
+            str(target), message("cannot be written ({error})", error=why_refused(error))
         ) from error
     return done(state, kept)
 

@@ -21,6 +21,7 @@ from silo.bom.errors import ConfigError, InputError, NotFoundError, RejectedErro
 from silo.bom.items.schema import CategoryRule
 from silo.bom.numbers import read_number
 from silo.bom.quantities import plain
+from silo.bom.system_refusals import why_refused
 from silo_server.web_address import address_problem
 
 DEFAULT_SCHEMA = "kindred-rd"
@@ -207,7 +208,7 @@ def category_rules(schema: Schema, env: Mapping[str, str] = os.environ) -> list[
         text = source.read_text("utf-8")
         rules = tomllib.loads(text).get("rules", [])
     except OSError as error:
-        raise ConfigError(f"{name} cannot be read: {error.strerror or error}") from error
+        raise ConfigError(f"{name} cannot be read: {why_refused(error)}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ConfigError(f"{name}: {error}") from error
     if not isinstance(rules, list):

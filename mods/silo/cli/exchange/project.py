@@ -55,9 +55,10 @@ def add_commit(parser: argparse.ArgumentParser) -> None:
 def run_status(args: argparse.Namespace) -> int:
     """Print how each file stands. Returns 1 if folder and server differ."""
     from silo.outbox.store import Store
-    from silo.vault.project import find_project, stand
+    from silo.vault.project import find_project, must_hold_files, stand
 
     project = find_project(args.tops, args.root)
+    must_hold_files(args.tops, project)
     with client_of(args) as client:
         reach(client)
         belonging, standings = stand(args.tops, project, client, Store())
@@ -85,13 +86,16 @@ def run_commit(args: argparse.Namespace) -> int:
         free_held,
         keep,
         left_in_queue,
+        must_hold_files,
         name_documents,
         read_project,
         remember,
         retry_held,
     )
 
-    belonging = read_project(args.tops, find_project(args.tops, args.root))
+    project = find_project(args.tops, args.root)
+    must_hold_files(args.tops, project)
+    belonging = read_project(args.tops, project)
     store = Store()
     away: UnreachableError | None = None
     with client_of(args) as client:

@@ -14,6 +14,7 @@ from rich.text import Text
 from silo import spoken
 from silo.bom.errors import Exit, InputError
 from silo.bom.message import message
+from silo.bom.system_refusals import why_refused
 from silo.cli.connection import client_of, named_item
 from silo.cli.json_output import print_json
 from silo.cli.options import add_options
@@ -69,7 +70,7 @@ def run_import(args: argparse.Namespace) -> int:
         data = Path(args.file).read_bytes()
     except OSError as error:
         raise InputError(
-            message("{file} cannot be read: {error}", file=repr(args.file), error=error.strerror or error)
+            message("{file} cannot be read: {error}", file=repr(args.file), error=why_refused(error))
         ) from error
     with client_of(args) as client:
         if args.kind == "bom":

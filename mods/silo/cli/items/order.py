@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from rich.text import Text
 
@@ -22,7 +22,9 @@ from silo.cli.terminal import console, plain, table_of
 from silo.output_files import csv_table, workbook
 
 if TYPE_CHECKING:
-    from silo.api.wire import OrderList
+    from rich.table import Table
+
+    from silo.api.wire import OrderList, OrderPart, SupplierPart
 
 
 def add_order(parser: argparse.ArgumentParser) -> None:
@@ -77,8 +79,6 @@ def run_order(args: argparse.Namespace) -> int:
 
 
 def _print_order(order: OrderList) -> None:
-    from silo.api.wire import SupplierPart
-
     out = console()
     head = message(
         "{part_number}: what to order for {pieces} with {spares} % spares. {state}",
@@ -90,46 +90,103 @@ def _print_order(order: OrderList) -> None:
     out.print(Text(plain(spoken(head)), "bold"))
     for warning in order.warnings:
         out.print(Text(f"⚠ {plain(spoken(warning))}", "yellow"))
-    titles = (
-        message("Part number"),
-        "Name",
-        "Needed",
-        "Ordered",
-        "Quantity",
-        "Supplier",
-        message("Its number"),
-        "Cost",
-    )
-    table = table_of("", *titles, "")
-    empty = SupplierPart(supplier="", currency="")
-    for part in sorted(order.parts, key=lambda part: (part.kind, (part.supplier_part or empty).supplier)):
-        of = part.supplier_part or empty
-        price = (
-            message(
-                "{needed} at {price} {currency}",
-                needed=part.quantity or part.needed,
-                price=part.price,
-                currency=part.currency,
-            )
-            if part.price
-            else ""
-        )
-        price = price or part.quantity or ""
-        cells = (
-            *(spoken(part.kind), part.part_number, part.name, f"{part.needed} {part.unit or ''}"),
-            *(part.ordered, spoken(price), of.supplier, of.number),
-            f"{part.cost or ''} {part.currency or ''}".strip(),
-            "; ".join(
-                filter(None, (*map(spoken, (part.cost_from, *part.remarks)), *(f.name for f in part.files)))
-            ),
-        )
-        table.add_row(*(Text(plain(cell)) for cell in cells))
+    rows = [
+        _Row(*(plain(cell) for cell in _cells(part)))
+        for part in sorted(order.parts, key=lambda part: (part.kind, _source(part).supplier))
+    ]
+    table = _wide_table(rows, out.is_terminal) if out.width >= _WIDE else _narrow_table(rows)
     if order.parts:
         out.print(table)
         days = message("not known") if order.lead_time_days is None else counted(order.lead_time_days, "day")
         for line in _sums(order):
             out.print(Text(plain(spoken(line))))
         out.print(Text(plain(spoken(message("Longest lead time: {days}", days=days)))))
+
+
+class _Row(NamedTuple):
+    """A part as it is shown, in the order of the columns."""
+
+    kind: str
+    number: str
+    name: str
+    needed: str
+    ordered: str
+    quantity: str
+    supplier: str
+    its_number: str
+    cost: str
+    remarks: str
+
+
+_TITLES = _Row(
+    "",
+    message("Part number"),
+    "Name",
+    "Needed",
+    "Ordered",
+    "Quantity",
+    "Supplier",
+    message("Its number"),
+    "Cost",
+    "",
+)
+
+# [columns] What all columns take with names of a usual length.
+_WIDE = 120
+
+
+def _source(part: OrderPart) -> SupplierPart:
+    """Return what is bought of a part; an empty one if that is not known."""
+    from silo.api.wire import SupplierPart
+
+    return part.supplier_part or SupplierPart(supplier="", currency="")
+
+
+def _cells(part: OrderPart) -> Iterator[str]:
+    quantity = part.quantity or ""
+    if part.price:
+        quantity = spoken(
+            message(
+                "{needed} at {price} {currency}",
+                needed=part.quantity or part.needed,
+                price=part.price,
+                currency=part.currency,
+            )
+        )
+    yield from (spoken(part.kind), part.part_number, part.name, f"{part.needed} {part.unit or ''}".strip())
+    yield from (str(part.ordered), str(quantity), _source(part).supplier, _source(part).number)
+    yield f"{part.cost} {part.currency or ''}".strip() if part.cost else spoken(message("not priced"))
+    source = part.cost_from if part.cost else ""
+    names = (file.name for file in part.files)
+    yield "; ".join(filter(None, (*map(spoken, (source, *part.remarks)), *names)))
+
+
+def _wide_table(rows: Sequence[_Row], for_eyes: bool) -> Table:
+    """Show a part in a line. For eyes a column in which no part has anything is left out; a pipe has all."""
+    kept = [
+        place
+        for place in range(len(_TITLES))
+        if not for_eyes or any(row[place] not in ("", "0") for row in rows)
+    ]
+    table = table_of(*(_TITLES[place] for place in kept))
+    for row in rows:
+        table.add_row(*(Text(row[place]) for place in kept))
+    return table
+
+
+def _narrow_table(rows: Sequence[_Row]) -> Table:
+    """Show a part with its supplier and its remarks below its name, so that no word breaks."""
+    table = table_of("", _TITLES.number, _TITLES.needed, _TITLES.cost, _TITLES.name)
+    for row in rows:
+        about = Text(row.name)
+        ordered = (
+            "" if row.ordered == "0" else spoken(message("{ordered} ordered already", ordered=row.ordered))
+        )
+        bought = " ".join(filter(None, (row.quantity, row.supplier, row.its_number)))
+        for more in filter(None, (bought, ordered, row.remarks)):
+            about.append(f"\n{more}", "dim")
+        table.add_row(row.kind, Text(row.number), Text(row.needed), Text(row.cost), about)
+    return table
 
 
 def _sums(order: OrderList) -> list[Message]:

@@ -127,6 +127,8 @@ def run_inertia(args: argparse.Namespace) -> int:
     # The small files first: a mistake in them should not cost the reading of the geometry.
     table = bom_table(args)
     task = _task(args)
+    if args.urdf_out and task.urdf is not None:
+        _refuse_another_robot(args.urdf_out, task.urdf)
     assembly = read_model(args.assembly, args)
     report = calculate(assembly, table, task)
     # What was found is shown first: where a link is refused, that is what explains it.
@@ -182,6 +184,23 @@ def _urdf(args: argparse.Namespace) -> Urdf | None:
             message("--joint is for geometry beside a URDF; the meshes of a URDF move with its links")
         )
     return urdf.at(pose) if pose else urdf
+
+
+def _refuse_another_robot(path: str, urdf: Urdf) -> None:
+    """Raise InputError if a URDF of another robot is at the place of the one that is written."""
+    from silo.inertia.urdf import read_urdf
+
+    if not Path(path).is_file() or not Path(path).stat().st_size:
+        return
+    there = read_urdf(path)
+    if there.robot != urdf.robot or not set(there.names) & set(urdf.names):
+        raise InputError(
+            message(
+                "{path} is the URDF of another robot, {name}; remove it, or give --urdf-out another name",
+                path=path,
+                name=there.robot or "?",
+            )
+        )
 
 
 def is_urdf(path: str) -> bool:

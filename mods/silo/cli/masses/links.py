@@ -13,7 +13,7 @@ from silo.cli.masses.geometry import read_model
 from silo.cli.masses.options import add_geometry_options, check_scenes, need_inertia_extra
 from silo.cli.options import add_each, add_options
 from silo.cli.outputs import add_outputs, add_preview
-from silo.output_files import beginning
+from silo.output_files import NEW
 
 
 def add_links(parser: argparse.ArgumentParser) -> None:
@@ -26,8 +26,8 @@ def add_links(parser: argparse.ArgumentParser) -> None:
         help="make N links of parts that lie together, whatever their names",
     )
     add_preview(parser, message("write the links as a 3D scene (.glb), one colour each; may be repeated"))
-    made_here = beginning(message("a link map"), r"^---\n# Link map for |^\{\s*\"links\"")
-    add_outputs(parser, {"--out MAP": message("write the map here, not to standard output")}, made_here)
+    # A map is there to be edited: each that exists is somebody's work.
+    add_outputs(parser, {"--out MAP": message("write the map here, not to standard output")}, NEW)
     add_geometry_options(parser)
 
 

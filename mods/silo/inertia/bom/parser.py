@@ -12,6 +12,7 @@ from silo.bom.headers import Heading
 from silo.bom.message import message
 from silo.bom.numbers import Mark, read_count
 from silo.bom.quantities import LARGEST_QUANTITY
+from silo.bom.system_refusals import why_refused
 from silo.inertia.bom.columns import MASSES, NAMING, MassColumns, continues, mass_columns
 from silo.inertia.bom.mass_cell import is_empty, parse_mass, unit_factor
 from silo.inertia.bom.mass_header import read_mass_header
@@ -78,7 +79,7 @@ class BOMParser:
             data = Path(path).read_bytes()
         except OSError as error:
             raise InputError(
-                message("{path}: the BOM cannot be read ({error})", path=path, error=error.strerror or error)
+                message("{path}: the BOM cannot be read ({error})", path=path, error=why_refused(error))
             ) from error
         return self.parse_bytes(data, str(path))
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from silo.bom.errors import DocumentError
 from silo.bom.message import message
+from silo.bom.system_refusals import why_refused
 
 
 class Format(StrEnum):
@@ -97,7 +98,7 @@ def _head(path: Path) -> bytes:
             head = stream.read(_HEAD_BYTES)
     except OSError as error:
         raise DocumentError(
-            str(path), message("cannot be opened: {error}", error=error.strerror or error)
+            str(path), message("cannot be opened: {error}", error=why_refused(error))
         ) from error
     if not head.strip():
         raise DocumentError(str(path), message("is empty; export it again"))

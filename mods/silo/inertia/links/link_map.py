@@ -23,6 +23,7 @@ import numpy as np
 
 from silo.bom.errors import ConfigError
 from silo.bom.message import message
+from silo.bom.system_refusals import why_refused
 from silo.inertia.arrays import Floats
 from silo.inertia.links.frames import MOST_RAD, origin_frame
 
@@ -54,7 +55,7 @@ def read_link_map(path: Path | str) -> LinkMap:
         text = Path(path).read_text("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(
-            message("{path}: the link map cannot be read ({error})", path=path, error=error)
+            message("{path}: the link map cannot be read ({error})", path=path, error=why_refused(error))
         ) from error
     return link_map(_yaml(text, str(path)), str(path))
 

@@ -17,6 +17,7 @@ from typing import Any
 from silo.bom.errors import ConfigError
 from silo.bom.message import message
 from silo.bom.numbers import parse_number
+from silo.bom.system_refusals import why_refused
 from silo.inertia.materials.densities import UNIT_NEEDED_BELOW, density_factor, read_density
 from silo.inertia.materials.material import Material
 from silo.inertia.materials.words import Words, words
@@ -52,7 +53,9 @@ def user_rows(path: Path | str) -> tuple[Material, ...]:
         text = path.read_text("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(
-            message("{path}: the material table cannot be read ({error})", path=path, error=error)
+            message(
+                "{path}: the material table cannot be read ({error})", path=path, error=why_refused(error)
+            )
         ) from error
     if path.suffix.lower() == ".csv":
         return _csv_rows(text, str(path))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from silo.bom.errors import InputError
 from silo.bom.message import message
+from silo.bom.system_refusals import why_refused
 from silo.platform.whole_files import replacing
 
 
@@ -27,7 +28,7 @@ def write_whole(path: Path | str, data: bytes, *, like: Path | str | None = None
             file.write(data)
     except OSError as error:
         raise InputError(
-            message("{path}: cannot be written ({error})", path=path, error=error.strerror or error)
+            message("{path}: cannot be written ({error})", path=path, error=why_refused(error))
         ) from error
 
 

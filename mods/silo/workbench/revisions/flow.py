@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 from silo.bom.errors import DocumentError, SiloError
 from silo.bom.message import message
+from silo.bom.system_refusals import why_refused
 from silo.outbox.store import KEPT_ASIDE_DAYS
 from silo.platform.user_folders import cache_folder
 from silo.workbench.activity.box import own_box
@@ -181,7 +182,7 @@ class RevisionFlow:
                     shutil.copyfileobj(read, write)
             except OSError as error:
                 raise DocumentError(
-                    path, message("cannot be written ({error})", error=error.strerror or error)
+                    path, message("cannot be written ({error})", error=why_refused(error))
                 ) from error
             remove_patiently(content)
         if doc is not None:
@@ -209,7 +210,7 @@ class RevisionFlow:
         except SiloError as error:
             self._box_error(path, error)
         except OSError as error:
-            self._box_error(path, DocumentError(path, error.strerror or str(error)))
+            self._box_error(path, DocumentError(path, why_refused(error)))
 
     def _box_error(self, path: str, error: SiloError) -> None:
         self._box(
