@@ -722,7 +722,8 @@ def test_a_folder_that_takes_nothing_is_listed_truthfully(
             lambda: looked.stage(commit(document)),
         ):
             with pytest.raises(
-                OutboxError, match=r"cannot be written \(the disk is read-only.*2 commits in .* cannot be sent"
+                OutboxError,
+                match=r"cannot be written \(the disk is read-only.*2 commits in .* cannot be sent",
             ):
                 write()
     descriptions = {path: path.read_bytes() for path in store.copies.iterdir()}
