@@ -476,7 +476,7 @@ def test_local_geometry_of_parts_is_not_reported(top: Doc) -> None:
 def test_what_a2plus_imported_is_the_part_in_its_file(top: Doc, bolt: Any) -> None:
     """A2plus embeds shapes and links nothing; ``sourceFile`` says what each part is."""
     problem = LinkProblem(FindingCode.MISSING_FILE, "./gone.FCStd")
-    top.__dict__["imported"] = lambda file: problem if "gone" in file else bolt
+    top.__dict__["imported"] = lambda file, _part: problem if "gone" in file else bolt
 
     def part(name: str, file: str) -> Any:
         return top.add("Part::FeaturePython", name, sourceFile=file, a2p_Version="0.4")

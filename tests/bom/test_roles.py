@@ -178,7 +178,8 @@ def all_hidden(doc: Doc) -> Obj:
 
 def imported_part(doc: Doc) -> Obj:
     """A2plus names a file, whose one part it is."""
-    doc.__dict__["imported"] = files_of_a2plus().__getitem__
+    files = files_of_a2plus()
+    doc.__dict__["imported"] = lambda file, _part: files[file]
     return doc.assembly(doc.add(PYTHON, "I", sourceFile="./alone.FCStd", a2p_Version="1"))
 
 
@@ -356,7 +357,8 @@ def documents(draw: st.DrawFn) -> Any:
     """A document with every kind, in any container or in none, that shows and consumes any other."""
     doc = Doc("/v/top.FCStd")
     far, made = bolt(), list[Any]()
-    doc.__dict__["imported"] = files_of_a2plus().__getitem__
+    files = files_of_a2plus()
+    doc.__dict__["imported"] = lambda file, _part: files[file]
     members = list[Any]()
     for number in range(draw(st.integers(1, 9))):
         more = {"Visibility": draw(st.booleans())}

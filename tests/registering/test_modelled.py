@@ -104,3 +104,34 @@ def test_copies_can_be_taken_apart() -> None:
     doc = Doc("/v/top.FCStd")
     (one,) = modelled_in(doc.assembly(dumb(doc, "A", "Rail"), dumb(doc, "B", "Rail001")), shapes())
     assert [each.objects for each in one.apart()] == [("A",), ("B",)]
+
+
+def test_a_configured_copy_is_offered_by_its_links() -> None:
+    """It counts already; registering gives it a number of its own, on each link with its values."""
+    doc = Doc("/v/top.FCStd")
+    base = Doc("/v/profile.FCStd").body(Label="Profile", L=100.0, SiloItemId="one")
+    links = [
+        doc.link(
+            f"L{number}",
+            doc.body(f"Copy{number}", L=length, SiloItemId="one"),
+            L=length,
+            LinkCopyOnChangeSource=base,
+        )
+        for number, length in enumerate((300.0, 300.0, 100.0))
+    ]
+    top = doc.assembly(*links)
+    (article,) = modelled_in(top, shapes())
+    assert (article.objects, article.entry.quantity) == (("L0", "L1"), 2)
+    assert (article.entry.label, article.variant_of) == ("Profile, L = 300", "Profile")
+    assert article.entry.doc_path == "/v/top.FCStd"
+    assert not article.decided
+    assert article.apart() == (article,)
+
+
+def test_a_configured_copy_with_a_number_of_its_own_is_declared() -> None:
+    doc = Doc("/v/top.FCStd")
+    base = Doc("/v/profile.FCStd").body(L=100.0, SiloItemId="one")
+    copy = doc.body("Copy", L=300.0, SiloItemId="one")
+    link = doc.link("L", copy, L=300.0, LinkCopyOnChangeSource=base, SiloItemId="two")
+    (article,) = modelled_in(doc.assembly(link), shapes())
+    assert (article.declared, article.entry.silo_uuid) == (True, "two")

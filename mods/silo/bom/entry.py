@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.frozen import Frozen, freeze
 from silo.bom.walk.standard import STANDARD_PARTS, standard_uuid
-from silo.bom.walk.variants import variant_key
+from silo.bom.walk.variants import values_in, variant_key
 
 
 @dataclass(frozen=True)
@@ -106,6 +106,13 @@ class BomEntry:
         if self.variant:
             return variant_key((self.doc_path, self.object_name), self.variant)
         return (self.doc_path, self.object_name)
+
+    @property
+    def counted_variants(self) -> tuple[str, ...]:
+        """Return the values of the variants that were added to this line, since they have no number of their
+        own.
+        """
+        return tuple(values for key in self.also if (values := values_in(key)) and values != self.variant)
 
     @property
     def is_standard(self) -> bool:

@@ -17,7 +17,7 @@ from silo.bom.compare.bom_diff import BomDiff
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import counted
 from silo.bom.findings import Finding, Severity
-from silo.bom.items.naming import display_name, own_part_name
+from silo.bom.items.naming import display_name, own_part_name, with_values
 from silo.bom.message import message
 from silo.bom.view.diff_rows import diff_rows
 from silo.bom.view.folders import base_folder, shorten
@@ -53,11 +53,15 @@ def entry_text(entry: BomEntry, base: str, *, own: bool = False) -> Text:
     """Write one line of the tree; ``own``: a part modelled in the assembly's file."""
     text = Text().append(f"{entry.quantity} × ", "bold")
     if entry.part_number:
-        text.append(plain(entry.part_number), "cyan").append("  ").append(plain(entry.name or ""))
+        name = with_values(entry.name or "", entry.variant)
+        text.append(plain(entry.part_number), "cyan").append("  ").append(plain(name))
     else:
         text.append(plain((own_part_name(entry) if own else display_name(entry)) or entry.object_name))
     where = relative(entry.doc_path, base)
     text.append(f"  {plain(where)}#{plain(entry.object_name)}", "dim")
+    if values := entry.counted_variants:
+        words = message("with variants: {values}", values=plain("; ".join(values)))
+        text.append(f"  {spoken(words)}", "yellow")
     if entry.missing:
         text.append(f"  {spoken('missing')}", "bold red")
     return text
@@ -102,7 +106,7 @@ def flat_table(rows: Sequence[Mapping[str, Any]]) -> Table:
         file = f"{row['doc_path']}#{row['object']}"
         table.add_row(
             Text(plain(row["part_number"] or "–"), "cyan" if row["part_number"] else "dim"),
-            Text(plain(row["name"])),
+            Text(plain(with_values(row["name"], row.get("variant", "")))),
             str(row["quantity"]),
             row["unit"],
             Text(plain(row["standard"] or file)),

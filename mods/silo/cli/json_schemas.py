@@ -100,6 +100,7 @@ Entry = _shape(
     base=Head,
     doc="A component; ``quantity`` is per one parent.",
     standard=_described(str | None, "the designation of a standard part"),
+    variant=(_described(str, "the values of a configured copy"), ""),
     quantity=int,
     missing=bool,
     level=int,
@@ -126,6 +127,7 @@ FlatLine = _shape(
     doc_path=str,
     object=str,
     missing=bool,
+    variant=(_described(str, "the values of a configured copy"), ""),
 )
 FolderBoms = _shape(
     "FolderBoms",

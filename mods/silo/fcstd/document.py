@@ -248,9 +248,9 @@ class FcstdDocument:
         problem = self._target(ref)
         return problem if isinstance(problem, Problem) else None
 
-    def imported(self, file: str) -> Any:
+    def imported(self, file: str, part: str = "") -> Any:
         """Return the part that A2plus imported from a file, or a LinkProblem that says why there is none."""
-        return self._library.imported(self, file)
+        return self._library.imported(self, file, part)
 
     def vectors(self, entry_name: str) -> tuple[Vector, ...]:
         """Read a list of vectors from its side entry (``PropertyVectorList::RestoreDocFile``)."""

@@ -119,13 +119,17 @@ class Library:
             self._note_respelt(owner, ref, location)
         return target
 
-    def imported(self, owner: FcstdDocument, file: str) -> object:
+    def imported(self, owner: FcstdDocument, file: str, part: str = "") -> object:
         """Find the part or assembly in a file that A2plus imported into ``owner``; a LinkProblem if there is
         none.
+
+        part
+            the label of the part, if the import names one of several.
 
         Like A2plus, it also looks for the file in the folder of the owner, if the file is no longer in its
         place.
         """
+        from silo.bom.walk.imported import named_part
         from silo.bom.walk.roots import choose_assembly
 
         for recorded in dict.fromkeys((file, os.path.basename(file))):
@@ -137,7 +141,8 @@ class Library:
         try:
             document = self._document(location)
             document.complete()
-            return choose_assembly(document)
+            named = named_part(document, part)
+            return choose_assembly(document) if named is None else named
         except FcstdError as error:
             return LinkProblem(error.finding, file, "", error.reason)
         except InputError as error:

@@ -4,7 +4,9 @@
 Nothing here counts: an identity on the object does, and the user gives it. The rules of this module:
 
 * what is shown, how often, and what is used up, the count says (:mod:`silo.bom.walk.roles`);
-* equal copies are proposed as one article: the same shape, or the same label but for FreeCAD's number.
+* equal copies are proposed as one article: the same shape, or the same label but for FreeCAD's number;
+* a configured copy of a part counts already, under the number of its original; its links in this file can
+  carry a number of its own. Equal values are one article.
 """
 
 from __future__ import annotations
@@ -17,13 +19,17 @@ from typing import Any
 
 from silo.bom.entry import BomEntry
 from silo.bom.errors import DocumentError, InputError, SiloError
-from silo.bom.items.naming import is_generic
+from silo.bom.items.naming import is_generic, with_values
+from silo.bom.key import Key
 from silo.bom.message import message
+from silo.bom.walk.contents import Count
 from silo.bom.walk.document import label_of, located, object_name, own
 from silo.bom.walk.identity import document_identity, own_identity
-from silo.bom.walk.roles import DECLARABLE
+from silo.bom.walk.kinds import is_container
+from silo.bom.walk.roles import DECLARABLE, Reader
 from silo.bom.walk.roots import choose_assembly, silent_reader
 from silo.bom.walk.survey import survey_of
+from silo.bom.walk.variants import Variant
 from silo.fcstd import Library
 from silo.fcstd.objects import FcstdObject
 
@@ -45,6 +51,9 @@ class Modelled:
         the file that A2plus imported it from.
     no_part
         the user said that it is no part, and the file keeps that (``SiloBomExclude``).
+    variant_of
+        the name of the original of a configured copy, under whose number the copy counts until it has one.
+        ``objects`` are then the links that show the copy. "" for anything else.
     """
 
     entry: BomEntry
@@ -52,6 +61,7 @@ class Modelled:
     alike: str = ""
     source: str = ""
     no_part: bool = False
+    variant_of: str = ""
 
     @property
     def decided(self) -> bool:
@@ -64,7 +74,11 @@ class Modelled:
         return self.entry.silo_uuid is not None
 
     def apart(self) -> tuple[Modelled, ...]:
-        """Make each object an article of its own; the quantity of each is then unknown."""
+        """Make each object an article of its own; the quantity of each is then unknown. Equal values are one
+        variant.
+        """
+        if self.variant_of:
+            return (self,)
         return tuple(
             replace(
                 self, entry=replace(self.entry, object_name=name, label=name, quantity=1), objects=(name,)
@@ -128,9 +142,12 @@ def modelled_in(top: Any, shape_of: Callable[[Any], str]) -> list[Modelled]:
     shape_of
         a text that is equal for equal shapes, wherever they are placed; "" if that is not known.
     """
-    contents = silent_reader().contents(top)
+    reader = silent_reader()
+    contents = reader.contents(top)
     shown: dict[str, tuple[Any, int]] = {}
     for count in () if contents.is_part else contents.own:
+        if reader.variant_of(count.target) is not None:
+            continue
         name = object_name(count.target)
         shown[name] = (count.target, count.quantity + (shown[name][1] if name in shown else 0))
     articles = [
@@ -140,7 +157,7 @@ def modelled_in(top: Any, shape_of: Callable[[Any], str]) -> list[Modelled]:
     declared: dict[str, tuple[list[Any], int]] = {}
     for count in contents.counts:
         target = count.target
-        is_here = getattr(target, "Document", None) is top.Document
+        is_here = getattr(target, "Document", None) is top.Document and reader.variant_of(target) is None
         if is_here and (identity := own_identity(target)):
             objects, before = declared.get(identity, ([], 0))
             objects += [] if target in objects else [target]
@@ -148,11 +165,37 @@ def modelled_in(top: Any, shape_of: Callable[[Any], str]) -> list[Modelled]:
     for identity, (objects, quantity) in declared.items():
         article = _article(objects, "", quantity)
         articles.append(replace(article, entry=replace(article.entry, silo_uuid=identity)))
+    articles += _variants(reader, [*contents.own, *contents.counts], top)
     of_file = survey_of(top.Document).of(DECLARABLE)
     no_parts = _alike([obj for obj, _ in of_file if own(obj, "SiloBomExclude") is True], shape_of)
     return articles + [
         replace(_article(objects, alike, len(objects)), no_part=True) for objects, alike in no_parts
     ]
+
+
+def _variants(reader: Reader, counts: Iterable[Count], top: Any) -> list[Modelled]:
+    """Find the configured copies of parts. Each is an article; its links in this file carry the identity."""
+    pieces: dict[Key, int] = {}
+    by_key: dict[Key, Variant] = {}
+    for count in counts:
+        if (variant := reader.variant_of(count.target)) is not None:
+            by_key[variant.key] = variant
+            pieces[variant.key] = pieces.get(variant.key, 0) + count.quantity
+    articles = []
+    for key, variant in by_key.items():
+        links = [link for link in reader.configured(variant) if link.Document is top.Document]
+        if not links:
+            continue
+        of = label_of(variant.base)
+        made = _article(links, "", pieces[key])
+        entry = replace(
+            made.entry,
+            label=with_values(of, variant.values),
+            silo_uuid=reader.variant_identity(variant),
+            is_assembly=is_container(variant.copy) and reader.contents(variant.copy).holds_components,
+        )
+        articles.append(replace(made, entry=entry, variant_of=of))
+    return articles
 
 
 def label_stem(label: str, labels: Set[str]) -> str:

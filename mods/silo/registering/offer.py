@@ -111,6 +111,7 @@ def offer(
     candidates = [
         _candidate(entry, seen, categories, crowded, learnt, numbers if entry in copies else {})
         for entry in (*resolved.unregistered, *copies)
+        if not entry.is_own_item  # its links have its identity, and are offered as such
     ]
     candidates = _originals_first(candidates)
     candidates.sort(key=lambda candidate: candidate.entry.is_standard)
@@ -120,7 +121,7 @@ def offer(
     registered = {
         (("", entry.standard) if entry.standard else entry.key): numbers[entry.silo_uuid.lower()]
         for entry in walk_entries(tree)
-        if entry.silo_uuid and entry.silo_uuid.lower() in numbers
+        if not entry.variant and entry.silo_uuid and entry.silo_uuid.lower() in numbers
     }
     proposed = sorted({candidate.proposal.category for candidate in looked} - {""})
     numbers_next = {category: next_number(api, schema, category) for category in proposed}

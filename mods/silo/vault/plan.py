@@ -95,13 +95,18 @@ class Plan:
         if isinstance(found, SiloError):
             raise found
         entries = tuple(
-            replace(entry, is_assembly=self._assemblies.get(entry.key, entry.is_assembly))
+            replace(entry, is_assembly=self._assemblies.get(_part(entry), entry.is_assembly))
             for entry in found.entries
         )
         findings = dict.fromkeys(self._with_suggestion.get(finding, finding) for finding in found.findings)
-        for key in (node.key, *(entry.key for entry in entries)):
+        for key in (node.key, *map(_part, entries)):
             findings.update(dict.fromkeys(self.findings.get(key, ())))
         return replace(found, entries=entries, findings=tuple(findings))
+
+
+def _part(entry: BomEntry) -> Key:
+    """Return the key of the part that an entry shows: of a variant, its original."""
+    return (entry.doc_path, entry.object_name) if entry.variant else entry.key
 
 
 @collecting_seldom()

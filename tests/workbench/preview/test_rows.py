@@ -202,6 +202,23 @@ def test_a_sub_assembly_whose_own_bom_is_not_in_silo_is_named(tmp_path: Path) ->
     assert {row.note for row in rows(look())} == {""}
 
 
+def test_variants_are_named_in_the_line_that_counts_them(tmp_path: Path) -> None:
+    """Without a number of their own they are pieces of their original; with one they are a line."""
+    silo = FakeSilo()
+    top, profile, own = (
+        silo.create_item("kindred-rd", "A01", name, item_type="part", properties={}).id
+        for name in ("Top", "Profile", "Long")
+    )
+    head = BomEntry(str(tmp_path / "top.FCStd"), top, object_name="A", is_assembly=True)
+    plain = BomEntry(str(tmp_path / "profile.FCStd"), profile, object_name="Body")
+    copy = replace(plain, variant="L = 300 mm", quantity=5)
+    longer = replace(plain, silo_uuid=own, variant="L = 900 mm", is_own_item=True)
+    found = Extraction(head, (plain, copy, longer))
+    table = rows(ask(Snapshot(head.doc_path, "Top", top, found), silo, CONTROL))
+    assert [(row.name, row.cad) for row in table] == [("Profile", "6"), ("Long, L = 900 mm", "1")]
+    assert "with variants: L = 300 mm" in table[0].note
+
+
 def test_a_sync_with_its_sub_assemblies_sends_those_that_differ_first(
     story: GearboxStory, preview: Preview
 ) -> None:

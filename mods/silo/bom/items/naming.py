@@ -58,4 +58,9 @@ def display_name(entry: BomEntry) -> str:
         return entry.standard
     label = clean_name(entry.label)
     name = label if label and not _GENERIC.match(label) else clean_name(entry.document_label) or label
-    return f"{name}, {entry.variant}" if entry.variant else name
+    return with_values(name, entry.variant)
+
+
+def with_values(name: str, values: str) -> str:
+    """Add the values of a variant to a name, as in "Profile, L = 300 mm", unless the name has them."""
+    return f"{name}, {values}" if values and not name.endswith(values) else name

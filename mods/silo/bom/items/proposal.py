@@ -45,8 +45,12 @@ class Proposal:
 
 
 def crowded_files(entries: Iterable[BomEntry]) -> frozenset[str]:
-    """Return the files that hold several components of this tree; standard parts do not count."""
-    files = Counter(entry.doc_path for entry in walk_entries(entries) if not entry.is_standard)
+    """Return the files that hold several components of this tree; standard parts do not count, nor do
+    variants of a part.
+    """
+    files = Counter(
+        entry.doc_path for entry in walk_entries(entries) if not (entry.is_standard or entry.variant)
+    )
     return frozenset(path for path, count in files.items() if count > 1)
 
 

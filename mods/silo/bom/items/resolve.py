@@ -46,7 +46,10 @@ def resolve_with(entries: Sequence[BomEntry], items: Known) -> tuple[list[BomEnt
         name = (item.get("name") or item.get("description") or number) if item is not None else None
         if not number:
             # A variant takes the number of its original, which is to be registered.
-            missing.setdefault((entry.doc_path, entry.object_name) if entry.variant else entry.key, entry)
+            is_for_original = entry.variant and not entry.is_own_item
+            place = (entry.doc_path, entry.object_name) if is_for_original else entry.key
+            if place not in missing or (missing[place].variant and not is_for_original):
+                missing[place] = entry
         bom_entry = replace(
             entry,
             part_number=number or None,
@@ -94,6 +97,8 @@ def merge_lines(entries: Iterable[BomEntry]) -> list[BomEntry]:
             continue
         if before.variant and not entry.variant:  # the line is that of the original
             before, entry = entry, before
+        if before.variant and entry.variant not in before.variant.split("; "):
+            before = replace(before, variant=f"{before.variant}; {entry.variant}")
         lines[name] = replace(
             before,
             also=(*before.also, entry.key, *entry.also),
@@ -117,9 +122,14 @@ def unregistered_findings(unresolved: Iterable[BomEntry]) -> tuple[Finding, ...]
             Severity.WARNING,
             message(
                 "{object_name} has no Silo part number and is left out of the BOM until it is registered.",
-                object_name=display_name(entry) or entry.object_name,
+                object_name=display_name(_registered_as(entry)) or entry.object_name,
             ),
             (Place(entry.doc_path, entry.object_name),),
         )
         for entry in unresolved
     )
+
+
+def _registered_as(entry: BomEntry) -> BomEntry:
+    """Return what is to be registered for an entry: of a variant that is no item of its own, the original."""
+    return replace(entry, variant="") if entry.variant and not entry.is_own_item else entry

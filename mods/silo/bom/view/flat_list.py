@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 from silo.bom.entry import BomEntry, Extraction, walk_entries
@@ -44,19 +45,21 @@ def flat_json(extraction: Extraction) -> list[dict[str, Any]]:
     """Return each component once, with its total, as JSON values: what a purchaser orders from.
 
     ``part_number`` and ``name`` as far as they are known, ``quantity`` multiplied down the tree, ``unit``,
-    the ``standard`` or the file (``doc_path``, ``object``), and if it is ``missing``.
+    the ``standard`` or the file (``doc_path``, ``object``), if it is ``missing``, and of a variant its values
+    (``variant``).
     """
     base = base_folder(extraction)
     return [
         {
             "part_number": entry.part_number,
-            "name": entry.name or entry.standard or display_name(entry) or entry.object_name,
+            "name": entry.name or display_name(replace(entry, variant="")) or entry.object_name,
             "quantity": count,
             "unit": PIECES,
             "standard": entry.standard,
             "doc_path": relative(entry.doc_path, base),
             "object": entry.object_name,
             "missing": entry.missing,
+            **({"variant": entry.variant} if entry.variant else {}),
         }
         for entry, count in flat_lines(extraction.entries)
     ]

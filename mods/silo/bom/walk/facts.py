@@ -55,6 +55,7 @@ class Facts:
         self._references: dict[str, References] = {}
         self._variants: dict[Key, Variant] = {}
         self._copies: dict[Key, Variant] = {}
+        self._configured: dict[Key, list[Any]] = {}
 
     def resolve(self, link: Any) -> Target:
         """Follow a link to its end."""
@@ -95,12 +96,35 @@ class Facts:
         base = self.key(target.obj)
         made = Variant(target.variant, target.configured, values, target.obj, base)
         found = self._variants.setdefault(variant_key(base, values), made)
+        links = self._configured.setdefault(found.key, [])
+        if not any(link is target.configured for link in links):
+            links.append(target.configured)
         self._copies[self.key(target.variant)] = found
         return found
 
     def variant_of(self, copy: Any) -> Variant | None:
         """Return the variant that a configured copy makes."""
         return self._copies.get(self.key(copy)) if self._copies else None
+
+    def configured(self, variant: Variant) -> tuple[Any, ...]:
+        """Return the links that show a variant, as far as they were read."""
+        return tuple(self._configured[variant.key])
+
+    def variant_identity(self, variant: Variant) -> str | None:
+        """Return the identity that a variant has of its own: on one of its links, or on the copy. FreeCAD
+        copies that of the original, which is none.
+        """
+        places = (*self.configured(variant), variant.copy)
+        inherited = {None, own_identity(variant.base)}
+        return next((found for found in map(own_identity, places) if found not in inherited), None)
+
+    def declared_identity(self, obj: Any) -> str | None:
+        """Return the identity of an object's own; a configured copy has that of its original unless it has
+        one.
+        """
+        if (variant := self.variant_of(obj)) is None:
+            return own_identity(obj)
+        return self.variant_identity(variant) or own_identity(variant.base)
 
     def no_component(self, key: Key, target: Any) -> str:
         """Return what the target is if it is no component; "" if it may be one."""

@@ -14,6 +14,7 @@ from typing import Any
 
 from silo.bom.message import message
 from silo.bom.walk.document import derived, first_of, own, property_names
+from silo.bom.walk.imported import is_sketch
 from silo.bom.walk.standard import fastener_type, is_tool
 
 
@@ -155,7 +156,10 @@ def _python_kind(obj: object) -> Kind:
     names = property_names(obj)
     if names is None:
         names = tuple(name for name in _ASKED_FOR if hasattr(obj, name))
-    return _kind_by_names(names) or _standard_kind(obj) or Kind.LOCAL
+    kind = _kind_by_names(names)
+    if kind is Kind.FOREIGN and is_sketch(obj):
+        return Kind.NOTHING
+    return kind or _standard_kind(obj) or Kind.LOCAL
 
 
 @lru_cache(maxsize=1024)

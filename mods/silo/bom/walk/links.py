@@ -30,7 +30,7 @@ from silo.bom.walk.chains import chains
 from silo.bom.walk.contents import Count, Lost
 from silo.bom.walk.document import NAMELESS, label_of, own
 from silo.bom.walk.facts import Canonical, Files
-from silo.bom.walk.identity import identity_of, own_identity, sole_identity
+from silo.bom.walk.identity import identity_of, sole_identity
 from silo.bom.walk.joints import held_by_joints, is_attached
 from silo.bom.walk.kinds import Kind, is_container, is_named_assembly
 from silo.bom.walk.roots import Whole, as_it_is, beside, choose_assembly, fates, silent_reader
@@ -289,19 +289,17 @@ class _Walker:
         return self._heads[key]
 
     def _variant_entry(self, variant: Variant) -> BomEntry:
-        """Make the entry of a configured copy: that of its original, with values.
-
-        It may have an identity of its own; FreeCAD copies that of the original.
+        """Make the entry of a configured copy: that of its original, with values. It may have an identity of
+        its own.
         """
         base = self.entry_for(variant.base)
-        identity = own_identity(variant.link) or own_identity(variant.copy)
-        is_own_item = identity is not None and identity != own_identity(variant.base)
+        identity = self.reader.variant_identity(variant)
         return replace(
             base,
-            silo_uuid=identity if is_own_item else base.silo_uuid,
+            silo_uuid=identity or base.silo_uuid,
             variant=variant.values,
             copy=self._files.key(variant.copy),
-            is_own_item=is_own_item,
+            is_own_item=identity is not None,
         )
 
     def tree(self, top: Any, level: int) -> tuple[BomEntry, ...]:
@@ -422,7 +420,7 @@ class _Walker:
             return ()
         lines: dict[Key, list[Count]] = {}
         for count in contents.own:
-            lines.setdefault(count.key, []).append(count)
+            lines.setdefault(self.component(count.target), []).append(count)
         entries = [self._entry(container, counts, level, (), silo_uuid=None) for counts in lines.values()]
         self.notes.own_parts(container, entries)
         return tuple(entries)

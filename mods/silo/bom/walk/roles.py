@@ -53,7 +53,8 @@ from silo.bom.walk.document import (
     same_document,
 )
 from silo.bom.walk.facts import Facts, Files
-from silo.bom.walk.identity import identity_of, own_identity
+from silo.bom.walk.identity import identity_of
+from silo.bom.walk.imported import source_of
 from silo.bom.walk.kinds import (
     COMPONENTS,
     INLINE,
@@ -245,7 +246,7 @@ class Reading:
 
     def _is_declared(self, obj: Any) -> bool:
         """Return True if an object has an identity of its own."""
-        identity = own_identity(obj)
+        identity = self._reader.declared_identity(obj)
         return bool(identity) and identity is not None and identity.lower() != self._identity
 
     def _is_mine(self, target: Any) -> bool:
@@ -644,13 +645,12 @@ class Reading:
 
     def _imported(self, key: Key, obj: Any) -> CountedObjects:
         """Return the part in another file from which A2plus imported this part."""
-        file = own(obj, "sourceFile")
-        is_file = isinstance(file, str) and file.lower().endswith(".fcstd")
-        ask = getattr(obj.Document, "imported", None) if is_file else None
+        file, part = source_of(obj)
+        ask = getattr(obj.Document, "imported", None) if file else None
         if ask is None:
             self._notes.add(FindingCode.FOREIGN_COMPONENT, obj, self._notes.place(obj).doc_path)
             return {key: (obj, 1)}
-        target = ask(file.replace("\\", "/"))
+        target = ask(file, part)
         if not isinstance(target, LinkProblem):
             if getattr(target, "is_document_root", False):
                 inner = self._reader.contents(target)
@@ -790,6 +790,8 @@ class Reading:
             self._notes.add(FindingCode.MIRRORED, link, target=target.obj)
         if target.scaled:
             self._notes.add(FindingCode.SCALED, link, target=target.obj)
-        if target.variant is not None:
+        variant = self._reader.variant(target)
+        is_own_item = variant is not None and self._reader.variant_identity(variant) is not None
+        if target.variant is not None and not is_own_item:
             values = values_of(target.configured, target.obj) or message("with its values unchanged")
             self._notes.add(FindingCode.VARIANT, link, target=target.obj, values=values)

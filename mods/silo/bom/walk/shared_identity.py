@@ -20,7 +20,7 @@ def identity_findings(entries: Iterable[BomEntry]) -> tuple[Finding, ...]:
     for uuid, components in users.items():
         if len(components) < 2:
             continue
-        where = tuple(Place(*key) for key in components)
+        where = tuple(Place(*(entry.copy if entry.variant else key)) for key, entry in components.items())
         if len({place.doc_path for place in where}) > 1:
             findings.append(copied_identity(uuid, where))
             continue

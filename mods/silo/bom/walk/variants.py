@@ -65,6 +65,11 @@ def variant_key(base: Key, values: str) -> Key:
     return (base[0], f"{base[1]}?{values}")
 
 
+def values_in(key: Key) -> str:
+    """Return the values in the key of a variant; "" for any other key."""
+    return key[1].partition("?")[2]
+
+
 def values_of(link: Any, base: Any) -> str:
     """Return the values with which a link shows something other than its original; "" if all are equal."""
     mine, theirs = (getattr(obj, "PropertiesList", None) or () for obj in (link, base))

@@ -18,6 +18,11 @@ from silo.bom.view.flat_list import PIECES, flat_json
 from silo.bom.view.tree_json import bom_json
 from silo.platform.whole_files import replacing
 
+_COLUMNS = (
+    *("part_number", "name", "variant", "quantity", "unit", "standard", "doc_path", "object", "missing"),
+)
+_HEADINGS = {"part_number": "part number", "variant": "values", "doc_path": "file"}
+
 
 def table_rows(extraction: Extraction, *, flat: bool) -> list[list[str | int]]:
     """Make the rows of a spreadsheet, with a heading; ``level`` is 1 for direct children of the assembly."""
@@ -31,10 +36,10 @@ def table_rows(extraction: Extraction, *, flat: bool) -> list[list[str | int]]:
 
     grow([]) if flat else grow(bom_json(extraction)["entries"])
     level = () if flat else ("level",)
-    columns = (*level, "part_number", "name", "quantity", "unit", "standard", "doc_path", "object", "missing")
+    columns = (*level, *_COLUMNS)
     printed = flat_json(extraction) if flat else rows
-    cells = [["yes" if row[name] is True else row[name] or "" for name in columns] for row in printed]
-    return [[name.replace("doc_path", "file").replace("_", " ") for name in columns], *cells]
+    cells = [["yes" if row.get(name) is True else row.get(name) or "" for name in columns] for row in printed]
+    return [[_HEADINGS.get(name, name) for name in columns], *cells]
 
 
 def write_csv(path: str, rows: list[list[str | int]]) -> None:

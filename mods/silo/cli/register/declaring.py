@@ -63,7 +63,9 @@ def undeclare(args: argparse.Namespace) -> int:
 
     no_part = bool(args.not_a_part)
     articles = [
-        part for part in modelled(args.top, args.assembly) if (not part.no_part if no_part else part.decided)
+        part
+        for part in modelled(args.top, args.assembly)
+        if (not (part.no_part or part.variant_of) if no_part else part.decided)
     ]
     path = articles[0].entry.doc_path if articles else os.path.realpath(args.top)
     wanted = chosen(articles, args.not_a_part or args.undeclare)

@@ -28,7 +28,8 @@ class FactCache:
     is_object
         True for a FreeCAD document object.
     imported
-        gives the part in a file that A2plus imported into a document: (path of the document, the file).
+        gives the part in a file that A2plus imported into a document: (path of the document, the file, the
+        label of the part in it).
     has_window
         True if the FreeCAD has a window, in which unsaved documents are seen.
     """
@@ -36,7 +37,9 @@ class FactCache:
     def __init__(
         self,
         is_object: Callable[[Any], bool],
-        imported: Callable[[str, str], Any] = lambda _owner, file: LinkProblem(FindingCode.BROKEN_LINK, file),
+        imported: Callable[[str, str, str], Any] = lambda _owner, file, _part: LinkProblem(
+            FindingCode.BROKEN_LINK, file
+        ),
         has_window: bool = False,
     ) -> None:
         self.has_window = has_window
@@ -158,11 +161,11 @@ class CachedDocument:
         obj = self.real.getObject(name)
         return self._cache.object(obj) if obj is not None else None
 
-    def imported(self, file: str) -> Any:
+    def imported(self, file: str, part: str = "") -> Any:
         """Return the part that A2plus imported from a file; it is read from that file, since FreeCAD does not
         open it.
         """
-        return self._cache.imported(self.FileName, file)
+        return self._cache.imported(self.FileName, file, part)
 
     def getPropertyByName(self, name: str) -> Any:
         """Return a property of the document; AttributeError if there is none, as in FreeCAD."""

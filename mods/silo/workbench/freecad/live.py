@@ -97,12 +97,12 @@ def cached_document(document: Any) -> CachedDocument:
     """
     library: Any = None
 
-    def imported(owner: str, file: str) -> Any:
+    def imported(owner: str, file: str, part: str) -> Any:
         from silo.fcstd import Library
 
         nonlocal library
         library = library or Library()
-        return library.imported(_Owner(owner), file)
+        return library.imported(_Owner(owner), file, part)
 
     return FactCache(host.is_object, imported, host.has_gui()).document(document)
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from silo.bom.compare.bom_diff import BomDiff
 from silo.bom.entry import BomEntry
 from silo.bom.findings import Finding, FindingCode, HiddenStanding, Severity
-from silo.bom.items.naming import display_name, own_part_name
+from silo.bom.items.naming import display_name, own_part_name, with_values
 from silo.bom.view.folders import shorten
 from silo.bom.walk.document import relative
 from silo.workbench.preview.comparison import Compared, Preview
@@ -141,6 +141,9 @@ def _assembly_rows(
         kind, silo, note = states.get(entry.part_number or "", (RowKind.UNCHANGED, "", ""))
         if (own := lines.get(entry.key)) is not None and entry.is_assembly and entry.part_number:
             note = "; ".join(filter(None, (note, _own_words(own))))
+        if values := entry.counted_variants:
+            words = translate("Silo", "with variants: {values}", values="; ".join(values))
+            note = "; ".join(filter(None, (note, words)))
         if entry.missing:
             file = relative(entry.doc_path, os.path.dirname(compared.resolved.assembly.doc_path))
             file += f"#{entry.object_name}" if entry.object_name else ""
@@ -148,7 +151,9 @@ def _assembly_rows(
         yield PreviewRow(
             kind,
             number=entry.part_number or "",
-            name=entry.name or (display_name(entry) if entry.missing else ""),
+            name=with_values(entry.name, entry.variant)
+            if entry.name
+            else (display_name(entry) if entry.missing else ""),
             cad=quantity(entry.quantity),
             silo=silo,
             note=note,

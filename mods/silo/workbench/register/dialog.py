@@ -243,7 +243,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self.table.horizontalHeader().setSectionResizeMode(NOTE, mode.Stretch)
         for column in (BUTTON, NO_PART):
             self.table.horizontalHeader().setSectionResizeMode(column, mode.ResizeToContents)
-        self.table.setColumnHidden(NO_PART, all(row.candidate.article is None for row in self._rows))
+        self.table.setColumnHidden(NO_PART, not any(row.is_modelled for row in self._rows))
         self.table.resizeRowsToContents()
 
     def _lay_out(self) -> None:
@@ -275,7 +275,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self.table.item(number, COMPONENT).setToolTip(tip(f"{entry.doc_path} · {entry.object_name}"))
         button = widgets.button(translate("Silo", "Register"), "", lambda: self._press(row))
         self.table.setCellWidget(number, BUTTON, button)
-        if row.candidate.article is not None:
+        if row.is_modelled:
             text = translate(
                 "Silo",
                 "Not listed again, here or on the command line; the file keeps this choice",

@@ -34,6 +34,7 @@ def section_words() -> dict[str, str]:
         "modelled": translate("Silo", "Modelled in this file, not counted"),
         "declared": translate("Silo", "Modelled in this file, and counted"),
         "no part": translate("Silo", "Modelled in this file, not a part"),
+        "variant": translate("Silo", "Configured copies of parts"),
     }
 
 
@@ -137,8 +138,16 @@ class EditedRow:
     def section(self) -> str:
         """Return the section of the row, a key of :func:`section_words`."""
         if (article := self.candidate.article) is not None:
+            if article.variant_of:
+                return "variant"
             return "no part" if article.no_part else "declared" if article.declared else "modelled"
         return "standard" if self.candidate.entry.is_standard else ""
+
+    @property
+    def is_modelled(self) -> bool:
+        """Return True if it is modelled in the assembly's own file; a configured copy is not."""
+        article = self.candidate.article
+        return article is not None and not article.variant_of
 
     @property
     def finished(self) -> bool:
@@ -259,7 +268,8 @@ class EditedRow:
             return texts
         new = translate("Silo", "new part: a new number")
         texts[NEW] = new if self.candidate.same_as else translate("Silo", "a new number")
-        if self.candidate.article is not None and len(self.candidate.article.objects) > 1:
+        article = self.candidate.article
+        if article is not None and len(article.objects) > 1 and not article.variant_of:
             texts[APART] = translate("Silo", "different parts: a number for each copy")
         for similar in self.candidate.similar:
             texts[similar.part_number] = f"{similar.part_number} {plain(similar.name, 60)}"
@@ -289,6 +299,9 @@ class EditedRow:
             return []
         if article.no_part:
             return [translate("Silo", "not a part: not listed again")]
+        if article.variant_of and not article.declared:
+            text = translate("Silo", "counts as {name}; check it to give it a number of its own")
+            return [text.replace("{name}", plain(article.variant_of, 60))]
         if article.declared:
             text, many = translate("Silo", "counts once"), translate("Silo", "counts {n} times")
         else:

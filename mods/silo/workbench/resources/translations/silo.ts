@@ -1277,6 +1277,11 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../preview/rows.py" />
+            <source>with variants: {values}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
             <source>missing: {file}</source>
             <translation type="unfinished" />
         </message>
@@ -1628,6 +1633,11 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../register/rows.py" />
+            <source>Configured copies of parts</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
             <source>Consumable</source>
             <translation type="unfinished" />
         </message>
@@ -1789,6 +1799,11 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../register/rows.py" />
             <source>not a part: not listed again</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>counts as {name}; check it to give it a number of its own</source>
             <translation type="unfinished" />
         </message>
         <message>

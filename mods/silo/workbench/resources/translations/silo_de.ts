@@ -1278,6 +1278,11 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../preview/rows.py" />
+            <source>with variants: {values}</source>
+            <translation>mit Varianten: {values}</translation>
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
             <source>missing: {file}</source>
             <translation>fehlt: {file}</translation>
         </message>
@@ -1629,6 +1634,11 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../register/rows.py" />
+            <source>Configured copies of parts</source>
+            <translation>Konfigurierte Kopien von Teilen</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
             <source>Consumable</source>
             <translation>Verbrauchsmaterial</translation>
         </message>
@@ -1791,6 +1801,11 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
             <location filename="../../register/rows.py" />
             <source>not a part: not listed again</source>
             <translation>kein Teil: nichts fragt mehr danach</translation>
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>counts as {name}; check it to give it a number of its own</source>
+            <translation>zählt als {name}; anhaken, um eine eigene Nummer zu vergeben</translation>
         </message>
         <message>
             <location filename="../../register/rows.py" />
