@@ -69,8 +69,9 @@ class MassDecision:
         of one piece, if it is given as such; else None and ``density`` [kg/m^3] times volume it is.
     quantum_kg
         the mass is known to ± this: by the BOM's digits, or by how much the material's density varies.
-    material, material_name, density_source
-        the BOM's text, the table's row it was understood as, and where its density comes from.
+    material, material_name, material_card, density_source
+        the BOM's text, the table's row it was understood as, the file of that row if it is a FreeCAD card,
+        and where its density comes from.
     pieces, compared
         how many pieces the BOM row is for, and whether its mass could be held against a density.
     """
@@ -83,6 +84,7 @@ class MassDecision:
     quantum_kg: float = 0.0
     material: str | None = None
     material_name: str | None = None
+    material_card: str = ""
     density_source: str = ""
     part_number: str = ""
     lines: tuple[int, ...] = ()
@@ -176,11 +178,11 @@ class MassRule:
     def _material(self, base: MassDecision, prototype: Prototype, text: str, to: str = "") -> MassDecision:
         answer = self.materials.find(text)
         notes = list(base.notes)
-        name, spread = None, 0.0
+        name, spread, card = None, 0.0, ""
         if isinstance(answer, MaterialHit):
             material = answer.material
             kind, density, where = Source.MATERIAL, material.density, material.source
-            name, spread = material.name, material.spread
+            name, spread, card = material.name, material.spread, material.card
             notes += density_doubts(prototype, material)
             if answer.doubt:
                 words = message(
@@ -219,6 +221,7 @@ class MassRule:
             # Six digits: pieces that are alike up to the last bit stay one part of the report.
             quantum_kg=float(f"{spread * density * prototype.volume_m3:.6g}"),
             material_name=name,
+            material_card=card,
             density_source=where,
             notes=tuple(notes),
         )

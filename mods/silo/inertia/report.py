@@ -67,6 +67,8 @@ class PartResult:
         instance paths of the pieces, ``/`` between levels.
     material, material_name
         the BOM's text, and the row of the material table it was understood as.
+    material_card
+        the file of the FreeCAD card that the density is from; "" if it is from a table.
     density
         [kg/m^3] that was used, or that the given mass amounts to; None without a volume.
     quantum
@@ -91,6 +93,7 @@ class PartResult:
     decided_by: Decided
     material: str | None = None
     material_name: str | None = None
+    material_card: str = ""
     density: float | None = None
     density_source: str = ""
     quantum: float = 0.0

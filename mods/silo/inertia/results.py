@@ -124,6 +124,7 @@ def _part(
         decided_by=decision.decided,
         material=decision.material,
         material_name=decision.material_name,
+        material_card=decision.material_card,
         density=decision.density if decision.density is not None else implied,
         density_source=decision.density_source,
         quantum=decision.quantum_kg,

@@ -7,8 +7,18 @@ import os
 from pathlib import Path
 
 import pytest
+import trimesh
 
+from silo.inertia.bom.parser import BOMParser
+from silo.inertia.calculation import calculate
+from silo.inertia.geometry import read
+from silo.inertia.geometry.options import ReadOptions
 from silo.inertia.materials.cards import card_folders, cards_in, materials_of
+from silo.inertia.materials.files import package_rows
+from silo.inertia.materials.table import MaterialTable
+from silo.inertia.output.json import report_json
+from silo.inertia.output.markdown import report_markdown
+from silo.inertia.task import Task
 
 INI = """; (c) somebody
 [General]
@@ -91,3 +101,23 @@ def test_a_real_freecad() -> None:
         assert found["Steel-Generic"] == pytest.approx(7900)
         assert "Default" not in found
         assert min(found.values()) > 5
+
+
+@pytest.mark.parametrize("with_card", [True, False])
+def test_a_report_says_which_card_a_material_took(tmp_path: Path, with_card: bool) -> None:
+    """The same BOM weighs less on a machine without FreeCAD, so a reader must see what it rests on."""
+    card = tmp_path / "Unobtainium.FCMat"
+    card.write_text(INI.replace("Steel-Generic", "Unobtainium").replace("7900", "5000"), "utf-8")
+    found = materials_of(cards_in([tmp_path])) if with_card else []
+    trimesh.creation.box((0.1, 0.1, 0.1)).export(tmp_path / "block.stl")
+    bom = tmp_path / "bom.csv"
+    bom.write_text("Name,Material\nblock,Unobtainium\n", "utf-8")
+    options = ReadOptions(isolate=False, cache=False, mesh_unit="m")
+    task = Task(MaterialTable((package_rows(),), lambda: found))
+    report = calculate(read(tmp_path / "block.stl", options=options), BOMParser().parse(bom), task)
+    (part,) = next(iter(report.links.values())).parts
+    assert part.total_mass == pytest.approx(5.0 if with_card else 1.0)
+    text = report_markdown(report)
+    assert ("Unobtainium → FreeCAD card Unobtainium.FCMat" in text) is with_card
+    assert ("FreeCAD card Unobtainium.FCMat" in report_json(report)) is with_card
+    assert ("unknown_material" in text) is not with_card

@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import argparse
+import codecs
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from silo.bom.errors import InputError
 from silo.bom.message import message
 from silo.cli.progress import set_step
 
@@ -24,12 +26,23 @@ def read_options(args: argparse.Namespace, **more: Any) -> ReadOptions:
 
     return ReadOptions(
         mesh_unit=args.mesh_unit,
+        step_encoding=_known_encoding(args.step_encoding or getattr(args, "encoding", None)),
         timeout_s=args.timeout,
         processes=args.geometry_jobs,
         siblings=not args.no_siblings,
         cache=not args.no_cache,
         **more,
     )
+
+
+def _known_encoding(name: str | None) -> str | None:
+    """Return the encoding; InputError for a name that Python does not know."""
+    try:
+        codecs.lookup(name or "utf-8")
+    except LookupError as error:
+        text = "there is no encoding {name}; usual are utf-8, cp1252, shift_jis, gbk, cp1251 and euc_kr"
+        raise InputError(message(text, name=name)) from error
+    return name
 
 
 def read_model(path: str, args: argparse.Namespace, **more: Any) -> Assembly:

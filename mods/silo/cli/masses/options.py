@@ -27,6 +27,14 @@ def add_geometry_options(parser: argparse.ArgumentParser) -> None:
     """Add the options for how files are read."""
     group = parser.add_argument_group("geometry")
     add_options(group, {"--mesh-unit UNIT": message("length unit of meshes that state none (mm, cm, m, in)")})
+    add_options(
+        group,
+        {
+            "--step-encoding NAME": message(
+                "of names in STEP files that are no UTF-8, for example shift_jis (default: --encoding)"
+            )
+        },
+    )
     group.add_argument(
         "--timeout", type=float, default=600.0, metavar="S", help="give up reading after S seconds"
     )

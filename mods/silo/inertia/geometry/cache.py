@@ -3,8 +3,9 @@
 
 The key holds the file's SHA-256, the reading options, the kernel's version and a fingerprint of our own
 code that measures. The folder is bounded: what was not used for longest goes first. A split assembly also
-keeps the hashes of the files it was completed from, and the names of those it lacked: one part file changed,
-added or removed, and the assembly is read again. Anything unexpected counts as "not there".
+keeps the hashes of the files it was completed from, and, if it lacked any, which files lay beside it: one
+part file changed, added or removed, and the assembly is read again. Anything unexpected counts as "not
+there".
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from silo.bom.walk.document import relative
 from silo.checksums import content_hash
 from silo.inertia.assembly import Assembly
 from silo.inertia.geometry.options import ReadOptions
-from silo.inertia.geometry.part_files import file_key, step_files
+from silo.inertia.geometry.part_files import step_files
 from silo.inertia.geometry.reading import GeometryReading
 from silo.inertia.geometry.stored import FORMAT, load
 from silo.platform.user_folders import cache_folder
@@ -141,7 +142,7 @@ def provenance(reading: GeometryReading, options: ReadOptions) -> dict[str, Any]
     folder = Path(reading.assembly.source).resolve().parent
     return {
         "others": {relative(str(path), str(folder)): content_hash(path) for path in reading.others},
-        "missing": sorted({file_key(name) for name in reading.missing}),
+        "beside": _beside(folder, options.sibling_depth) if reading.missing else None,
         "absent": sorted(relative(str(path), str(folder)) for path in reading.absent),
         "depth": options.sibling_depth,
     }
@@ -156,10 +157,17 @@ def _holds(extra: Mapping[str, Any], source: Path) -> bool:
             return False
     if any((folder / name).exists() for name in extra.get("absent", ())):
         return False
-    missing = set(extra.get("missing", ()))
-    return not missing or not any(
-        file_key(path.stem) in missing for path in step_files(folder, int(extra.get("depth", 0)))
-    )
+    beside = extra.get("beside")
+    return beside is None or beside == _beside(folder, int(extra.get("depth", 0)))
+
+
+def _beside(folder: Path, depth: int) -> dict[str, int]:
+    """Map the STEP files in a folder and below it → time of writing. A new one may hold what is missing."""
+    times = {}
+    for path in step_files(folder, depth):
+        with suppress(OSError):
+            times[relative(str(path), str(folder))] = path.stat().st_mtime_ns
+    return times
 
 
 def changed_since(begin_ns: int, extra: Mapping[str, Any], source: Path) -> bool:

@@ -61,6 +61,8 @@ class ReadOptions:
     mesh_unit
         length unit of files that state none (STL, OBJ, PLY): a key of :data:`MESH_UNITS`; None reads mm and
         says so.
+    step_encoding
+        of names in STEP files whose bytes are no UTF-8; None reads Windows-1252, and says so.
     siblings, sibling_depth, max_siblings
         resolve products without geometry from files named after them, in the file's own folder and so many
         folder levels below it, at most so many files.
@@ -89,6 +91,7 @@ class ReadOptions:
     eps: float = 1e-8
     mesh_check: bool = True
     mesh_unit: str | None = None
+    step_encoding: str | None = None
     siblings: bool = True
     sibling_depth: int = 2
     max_siblings: int = 200

@@ -600,7 +600,8 @@ def _documents(source: Part21) -> dict[int, tuple[str, ...]]:
     }
     documents: dict[int, tuple[str, ...]] = {}
     for _, arguments in source.of("APPLIED_DOCUMENT_REFERENCE"):
-        names = by_document.get(ref(arguments, 0), ())
+        document = ref(arguments, 0)  # of the file itself (Pro/E, CATIA), or of a document that stands for it
+        names = (files[document],) if document in files else by_document.get(document, ())
         for pd in refs(arguments[2]) if len(arguments) > 2 else ():
             documents[pd] = documents.get(pd, ()) + names
     return documents

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import re
 import unicodedata
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath, PureWindowsPath
@@ -19,6 +20,16 @@ def file_key(name: str) -> str:
     blanks.
     """
     return unicodedata.normalize("NFC", name).strip().casefold()
+
+
+_KIND = re.compile(r"[_.\s](?:prt|asm|part|assembly)(?:\.\d{1,4})?$")
+
+
+def kindless(key: str) -> str:
+    """Return a :func:`file_key` without the kind that some programs add: Pro/E's ``head_back_prt``,
+    ``head_back.prt.3``.
+    """
+    return _KIND.sub("", key) or key
 
 
 def bare_stem(document: str) -> str:

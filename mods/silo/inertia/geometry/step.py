@@ -6,10 +6,11 @@ kernel splits a product with mixed bodies into an assembly of unnamed leaves; th
 product around them. And it opens files that a STEP file names, wherever they are: :mod:`text` takes the
 names out, and :class:`Siblings` looks for the files by our rules.
 
-SolidWorks and CATIA write one file per part, and an assembly file whose products hold nothing. All readers
-tried give such an assembly no solid, and no message. Here a product without geometry is looked for as
-``<product name>.STEP`` (.step, .stp; case ignored) in the assembly's folder and some levels below it, never
-outside of it, whatever path the file itself names.
+SolidWorks, CATIA and Pro/E write one file per part, and an assembly file whose products hold nothing. All
+readers tried give such an assembly no solid, and no message. Here a product without geometry is looked for in
+the assembly's folder and some levels below it, never outside of it, whatever path the file itself names: as
+the file that the text names, as ``<product name>.STEP`` (.step, .stp; case ignored), as
+``<product name>_prt.stp``, and as a file that holds the product of this name and no other.
 
 The bodies that the file's text names are compared with the solids that the kernel's reader made of them. The
 reader drops what it does not know: replicas, primitives, CSG trees, swept areas, triangles beside an exact
@@ -21,9 +22,12 @@ from __future__ import annotations
 
 import math
 import os
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -70,9 +74,16 @@ from silo.inertia.geometry.measured import (
 from silo.inertia.geometry.names import clean, is_generic
 from silo.inertia.geometry.options import ReadOptions, Report
 from silo.inertia.geometry.part21 import ProductFacts, Products
-from silo.inertia.geometry.part_files import bare_stem, file_key, step_files
+from silo.inertia.geometry.part_files import bare_stem, file_key, kindless, step_files
 from silo.inertia.geometry.reading import GeometryReading
-from silo.inertia.geometry.step_text import MARK, Prepared, SphereTurn, prepare, with_turned_spheres
+from silo.inertia.geometry.step_text import (
+    MARK,
+    Prepared,
+    SphereTurn,
+    only_product,
+    prepare,
+    with_turned_spheres,
+)
 from silo.inertia.geometry.together import Floats, combined
 from silo.inertia.notes import GeometryCode, Note
 from silo.platform.whole_files import scratch_folder
@@ -91,7 +102,12 @@ def read_step(
         returns what was found in the file's text, if that search was begun already.
     """
     report("reading", 0, 0)
-    step = load(path, max_instances=options.max_instances, text=text() if text is not None else None)
+    step = load(
+        path,
+        max_instances=options.max_instances,
+        text=text() if text is not None else None,
+        encoding=options.step_encoding,
+    )
     siblings = Siblings(
         step, options, helpers, lambda name: report(message("reading {name}", name=name), 0, 0)
     )
@@ -310,17 +326,26 @@ class StepFile:
 
 
 def load(
-    path: Path, prefix: str = "", max_instances: int = 1_000_000, text: Prepared | None = None
+    path: Path,
+    prefix: str = "",
+    max_instances: int = 1_000_000,
+    text: Prepared | None = None,
+    encoding: str | None = None,
 ) -> StepFile:
     """Read one STEP file. ``prefix`` goes before every key. DocumentError if it cannot be read.
 
     text
         what :func:`prepare` found, if it was called already.
+    encoding
+        of names that are no UTF-8.
     """
     with scratch_folder("silo-step-") as folder:
-        text = text or prepare(path, Path(folder), max_instances)
+        text = text or prepare(path, Path(folder), max_instances, encoding)
         step, doubts = _walked(path, prefix, text)
-        return _with_faces_read_again(step, doubts, prefix, text, Path(folder)) if doubts else step
+        if doubts:
+            step = _with_faces_read_again(step, doubts, prefix, text, Path(folder))
+        step.said += text.said
+        return step
 
 
 def _walked(path: Path, prefix: str, text: Prepared) -> tuple[StepFile, dict[str, file_faces.Doubt]]:
@@ -612,7 +637,6 @@ class Siblings:
         self._helpers = helpers
         self._reading = reading
         self._root = Path(os.path.realpath(top.path)).parent
-        self._index: dict[str, list[Path]] | None = None
         self._loaded: dict[Path, StepFile | str] = {}
         self._open = {Path(os.path.realpath(top.path))}
         self.problems: dict[str, Note] = {}
@@ -651,7 +675,13 @@ class Siblings:
             self._helpers.load_kernel()
         options = self._options
         rows = [
-            (path, f"{path.relative_to(self._root).as_posix()}#", options.eps, options.mesh_check)
+            (
+                path,
+                f"{path.relative_to(self._root).as_posix()}#",
+                options.eps,
+                options.mesh_check,
+                options.step_encoding,
+            )
             for path in paths
         ]
         read = self._helpers.all(
@@ -663,12 +693,19 @@ class Siblings:
 
     def _find(self, key: str) -> tuple[Path | None, str]:
         node, facts = self._top.nodes[key], self._top.facts[key]
-        wanted = [bare_stem(document) for document in facts.documents] + [node.name, facts.part_number]
-        paths: list[Path] = []
-        for name in filter(None, wanted):
-            paths = [p for p in self._files().get(file_key(name), ()) if p not in self._open]
-            if paths:
-                break
+        names = [file_key(name) for name in (node.name, facts.part_number) if name]
+        documents = [file_key(bare_stem(document)) for document in facts.documents]
+        answers = (
+            found
+            for index, keys in (
+                (self._files, [*documents, *names]),
+                (self._kindless, [kindless(key) for key in names]),
+                (self._by_product, names),
+            )
+            for key in keys
+            if (found := [p for p in index.get(key, ()) if p not in self._open])
+        )
+        paths = next(answers, [])
         if not paths:
             return None, (
                 message(
@@ -681,19 +718,37 @@ class Siblings:
         nearest = min(len(p.parts) for p in paths)
         best = [p for p in paths if len(p.parts) == nearest]
         if len(best) > 1:
-            names = ", ".join(str(p.relative_to(self._root)) for p in best)
+            several = ", ".join(str(p.relative_to(self._root)) for p in best)
             return None, message(
                 "the file holds no geometry for it, and several files are named after it: {names}",
-                names=names,
+                names=several,
             )
         return best[0], ""
 
-    def _files(self) -> dict[str, list[Path]]:
-        if self._index is None:
-            self._index = {}
-            for path in step_files(self._root, self._options.sibling_depth) if self._options.siblings else ():
-                self._index.setdefault(file_key(path.stem), []).append(path)
-        return self._index
+    @cached_property
+    def _files(self) -> Mapping[str, list[Path]]:
+        """Map the key of a file's name → files in the folder and below it."""
+        index: dict[str, list[Path]] = defaultdict(list)
+        for path in step_files(self._root, self._options.sibling_depth) if self._options.siblings else ():
+            index[file_key(path.stem)].append(path)
+        return index
+
+    @cached_property
+    def _kindless(self) -> Mapping[str, list[Path]]:
+        """Map the same without the kind in the file's name ("head_back_prt")."""
+        index: dict[str, list[Path]] = defaultdict(list)
+        for key, paths in self._files.items():
+            index[kindless(key)] += paths
+        return index
+
+    @cached_property
+    def _by_product(self) -> Mapping[str, list[Path]]:
+        """Map the key of a product → files that hold this product alone, whatever they are called."""
+        index: dict[str, list[Path]] = defaultdict(list)
+        for path in islice((p for paths in self._files.values() for p in paths), self._options.max_siblings):
+            for name in only_product(path):
+                index[file_key(name)].append(path)
+        return index
 
     def _fill(self, key: str, path: Path) -> list[str]:
         """Put the file's content in the product's place; returns the products in it that are empty
@@ -742,12 +797,12 @@ class Siblings:
                 self._top.stated[key] = self._top.stated[roots[0].product]
 
 
-def part_file(path: Path, prefix: str, eps: float, mesh_check: bool) -> StepFile | str:
+def part_file(path: Path, prefix: str, eps: float, mesh_check: bool, encoding: str | None) -> StepFile | str:
     """Read and measure a part's own file, and drop the kernel's shapes. Returns a text if something is
     wrong.
     """
     try:
-        part = load(path, prefix)
+        part = load(path, prefix, encoding=encoding)
     except DocumentError as error:
         return error.reason
     part.measured = {

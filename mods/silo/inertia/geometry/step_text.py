@@ -31,6 +31,7 @@ from silo.inertia.geometry.part21 import (
     Part21,
     Products,
     count_placed,
+    decoded,
     entities,
     read_products,
     ref,
@@ -38,6 +39,7 @@ from silo.inertia.geometry.part21 import (
     scan,
 )
 from silo.inertia.geometry.part_files import file_key, step_files
+from silo.inertia.notes import GeometryCode, Note
 
 MANY_FACES = 3000
 """From so many on, measuring takes so long that a second processor is worth its start."""
@@ -50,11 +52,14 @@ _EXTERNAL = re.compile(
 
 @dataclass(frozen=True)
 class Prepared:
-    """What the text says of products, which file the kernel shall read, and how many faces there are."""
+    """What the text says of products, which file the kernel shall read, how many faces there are, and what
+    was noticed of the names.
+    """
 
     products: Products
     source: Path
     faces: int
+    said: tuple[Note, ...] = ()
 
 
 def begin(path: Path, options: ReadOptions, helpers: Helpers) -> Callable[[], Prepared]:
@@ -65,7 +70,9 @@ def begin(path: Path, options: ReadOptions, helpers: Helpers) -> Callable[[], Pr
     result is asked for.
     """
     large = path.stat().st_size >= WORTH_HELP and helpers.start()
-    text = helpers.begin(prepare, path.resolve(), helpers.folder(), options.max_instances)
+    text = helpers.begin(
+        prepare, path.resolve(), helpers.folder(), options.max_instances, options.step_encoding
+    )
 
     def found() -> Prepared:
         prepared = text()
@@ -94,9 +101,15 @@ def _bytes_beside(path: Path, products: Products, options: ReadOptions) -> int:
     return sum(file.stat().st_size for file in islice(files, options.max_siblings))
 
 
-def prepare(path: Path, folder: Path, max_instances: int) -> Prepared:
-    """Look through a STEP file; if it is rewritten, the copy is in ``folder``. Raises DocumentError."""
-    with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
+def prepare(path: Path, folder: Path, max_instances: int, encoding: str | None = None) -> Prepared:
+    """Look through a STEP file; if it is rewritten, the copy is in ``folder``. Raises DocumentError.
+
+    encoding
+        of strings that are no UTF-8; None takes Windows-1252, and notes it.
+    """
+    with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as stored:
+        recoded, foreign = in_utf8(stored, encoding or USUAL_ENCODING)
+        data: Buffer = stored if recoded is None else recoded
         text = scan(data, WANTED | HIDING if data.find(b"INVISIBILITY") > 0 else WANTED)
         if not text.complete:
             raise DocumentError(
@@ -111,11 +124,74 @@ def prepare(path: Path, folder: Path, max_instances: int) -> Prepared:
             # The kernel would open the files that are named, in any folder, without asking.
             changed = _EXTERNAL.sub(rb"\1'silo-looks-for-it'", data[:] if changed is None else changed)
         faces = sum(1 for _ in _FACE.finditer(data))
+        said = tuple(_guessed_names(text, foreign)) if foreign and encoding is None else ()
+        changed = changed or recoded
     if changed is None:
-        return Prepared(products, path, faces)
+        return Prepared(products, path, faces, said)
     source = folder / "part.step"
     source.write_bytes(changed)
-    return Prepared(products, source, faces)
+    return Prepared(products, source, faces, said)
+
+
+USUAL_ENCODING = "cp1252"
+"""Of strings that are no UTF-8, if the user names no encoding."""
+
+_FOREIGN = re.compile(rb"'[^'\x80-\xff]*+[\x80-\xff][^']*+'")
+"""A string with bytes above 127. Outside of strings and comments no file has such bytes."""
+
+_NAMED = ("PRODUCT", "NEXT_ASSEMBLY_USAGE_OCCURRENCE", "DESCRIPTIVE_REPRESENTATION_ITEM", "DOCUMENT_FILE")
+
+
+def in_utf8(data: Buffer, encoding: str) -> tuple[bytes | None, frozenset[str]]:
+    """Write a file's strings in UTF-8, each that is not in it already. Returns the text and these strings;
+    (None, none) if all is UTF-8.
+
+    The standard knows ASCII with escapes only. What programs write anyway is the code page of its
+    machine, and Shift-JIS and GBK have bytes in it that look like the backslash of an escape.
+    """
+    foreign: set[str] = set()
+
+    def recoded(match: re.Match[bytes]) -> bytes:
+        try:
+            match[0].decode("utf-8")
+        except UnicodeDecodeError:
+            # Old programs break lines after 72 bytes, in the middle of a character too.
+            whole = match[0].translate(None, b"\r\n").decode(encoding, errors="replace").encode("utf-8")
+            foreign.add(decoded(whole[1:-1]))
+            return whole
+        return match[0]
+
+    if _FOREIGN.search(data) is None:
+        return None, frozenset()
+    new = _FOREIGN.sub(recoded, data)
+    return (new if foreign else None), frozenset(foreign)
+
+
+def _guessed_names(text: Part21, foreign: frozenset[str]) -> Iterator[Note]:
+    """Note that names of the file are in an encoding that was guessed."""
+    found = (value for _, arguments in text.of(*_NAMED) for value in arguments if value in foreign)
+    names = list(islice(dict.fromkeys(found), 3))
+    if names:
+        words = message(
+            "names in the file are no UTF-8 and were read as Windows-1252: {names}; if that is wrong, name "
+            "their encoding (--step-encoding shift_jis, gbk, cp1251, euc_kr)",
+            names=", ".join(f"“{name}”" for name in names),
+        )
+        yield Note(GeometryCode.NAME, words)
+
+
+_PRODUCT = re.compile(rb"=\s*+PRODUCT\s*+\(\s*+'((?:[^']|'')*+)'\s*+,\s*+'((?:[^']|'')*+)'")
+
+
+def only_product(path: Path) -> tuple[str, ...]:
+    """Return number and name of a STEP file's product; nothing if it holds several, or cannot be read."""
+    try:
+        with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
+            found = list(islice(_PRODUCT.finditer(data), 2))
+            words = {decoded(word).strip() for match in found for word in match.groups()}
+    except (OSError, ValueError):
+        return ()
+    return tuple(sorted(words - {""})) if len(found) == 1 else ()
 
 
 def _refuse_bombs(path: Path, products: Products, most: int) -> None:

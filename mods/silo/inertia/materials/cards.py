@@ -94,7 +94,8 @@ def materials_of(cards: Iterable[Card]) -> list[Material]:
             title = card.name or stem
             aliases = {stem, stem.removesuffix("-Generic"), title.removesuffix(" Generic")} - {title}
             source = message("FreeCAD card {name}", name=card.path.name)
-            materials.setdefault(title, Material(title, card.density, tuple(sorted(aliases)), source))
+            made = Material(title, card.density, tuple(sorted(aliases)), source, card=card.path.name)
+            materials.setdefault(title, made)
     return list(materials.values())
 
 

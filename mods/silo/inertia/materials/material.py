@@ -16,6 +16,8 @@ class Material:
         [kg/m^3] at room temperature; it varies by ± ``spread`` of itself between kinds of the material.
     family
         the more general row, or "".
+    card
+        the file of the FreeCAD card that it is from, so that it is known on this machine alone; else "".
     """
 
     name: str
@@ -24,6 +26,7 @@ class Material:
     source: str = ""
     family: str = ""
     spread: float = 0.0
+    card: str = ""
 
 
 @dataclass(frozen=True)

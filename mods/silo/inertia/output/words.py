@@ -40,10 +40,12 @@ def how(part: PartResult) -> str:
     )
 
 
-def material_of(part: PartResult) -> str:
-    """Return the BOM's material, followed by its name in the table if that differs."""
+def material_of(part: PartResult, say: Say = str) -> str:
+    """Return the BOM's material, followed by its name in the table if that differs, or by its card."""
     text = part.material or ""
     name = part.material_name or ""
+    if part.material_card:
+        return f"{text} → {say(message('FreeCAD card {name}', name=part.material_card))}"
     if not name or name.casefold() == text.casefold():
         return text or name
     return f"{text} → {name}" if text else name
@@ -88,7 +90,7 @@ def part_cells(link: str, part: PartResult, say: Say = str) -> tuple[str, ...]:
         short(part.mass),
         say(SOURCE_WORDS[part.source]),
         say(how(part)),
-        material_of(part),
+        material_of(part, say),
     )
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ from step_writer import emptied
 
 from silo.bom.errors import DocumentError
 from silo.inertia.assembly import Assembly
+from silo.inertia.geometry import read
+from silo.inertia.geometry.options import ReadOptions
 from silo.inertia.notes import GeometryCode
 
 
@@ -198,3 +201,65 @@ def test_an_assembly_file_alone_is_an_error_nowhere_but_a_problem(split: Path, r
     except DocumentError as error:  # pragma: no cover - the behaviour under test
         pytest.fail(f"it must be read: {error}")
     assert "put their files into its folder" in assembly.problems[0].message
+
+
+@pytest.mark.parametrize("name", ["hand_prt.stp", "HAND.prt.stp", "hand.prt.12.step", "hand_asm.STEP"])
+def test_the_kind_in_the_name_of_a_sibling_does_not_matter(
+    name: str, split: Path, read_in: Any, codes_of: Any
+) -> None:
+    """Pro/E and Creo write the kind of a file behind its name."""
+    (split.parent / "hand.STEP").rename(split.parent / name)
+    assembly = read_in(split)
+    assert volume_mm3(assembly) == pytest.approx(22_000)
+    assert codes_of(assembly) == [GeometryCode.EXTERNAL_FILE]
+
+
+def test_a_file_of_that_product_is_found_under_any_name(split: Path, read_in: Any) -> None:
+    """A company's number as the file's name: the only product in it says what it is."""
+    (split.parent / "hand.STEP").rename(split.parent / "4711-02.stp")
+    assembly = read_in(split)
+    assert volume_mm3(assembly) == pytest.approx(22_000)
+    assert "4711-02.stp" in assembly.problems[0].message
+
+
+def test_two_files_of_one_product_are_a_question(split: Path, read_in: Any, codes_of: Any) -> None:
+    data = (split.parent / "hand.STEP").read_bytes()
+    (split.parent / "hand.STEP").rename(split.parent / "4711-02.stp")
+    (split.parent / "4711-03.stp").write_bytes(data)
+    assembly = read_in(split)
+    assert volume_mm3(assembly) == pytest.approx(20_000)
+    assert (
+        "4711-02.stp, 4711-03.stp" in assembly.prototypes[assembly.instances[2].prototype].problems[0].message
+    )
+
+
+def test_the_file_that_the_text_names_is_found(split: Path, read_in: Any) -> None:
+    """Pro/E and CATIA refer to the file itself, without a document in between; its folder is not opened."""
+    text = split.read_text("ascii")
+    product = re.search(r"#(\d+) = PRODUCT\('hand'", text)
+    assert product is not None
+    formation = re.search(rf"#(\d+) = PRODUCT_DEFINITION_FORMATION\([^#]*#{product[1]}\)", text)
+    assert formation is not None
+    definition = re.search(rf"#(\d+) = PRODUCT_DEFINITION\([^#]*#{formation[1]},", text)
+    assert definition is not None
+    named = (
+        "#90000=DOCUMENT_TYPE('');\n#90001=DOCUMENT_FILE('C:\\\\parts\\\\x17.stp','','',#90000,'','');\n"
+        f"#90002=APPLIED_DOCUMENT_REFERENCE(#90001,'',(#{definition[1]}));\n"
+    )
+    split.write_text(text.replace("ENDSEC;\nEND-ISO", f"{named}ENDSEC;\nEND-ISO"), "ascii")
+    file = split.parent / "hand.STEP"
+    # Another product in it, so that its name and its content do not lead there.
+    text = file.read_text("ascii").replace("'hand'", "'thing'")
+    file.unlink()
+    (split.parent / "x17.stp").write_text(text, "ascii")
+    assert volume_mm3(read_in(split)) == pytest.approx(22_000)
+
+
+def test_a_part_that_appears_under_another_name_ends_a_kept_reading(split: Path, tmp_path: Path) -> None:
+    options = ReadOptions(isolate=True, cache_dir=tmp_path / "kept", processes=1)
+    hand = split.parent / "hand.STEP"
+    data = hand.read_bytes()
+    hand.unlink()
+    assert volume_mm3(read(split, options=options)) == pytest.approx(20_000)
+    (split.parent / "4711-02.stp").write_bytes(data)
+    assert volume_mm3(read(split, options=options)) == pytest.approx(22_000)
