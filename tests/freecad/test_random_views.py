@@ -35,9 +35,8 @@ def lines(found: Extraction) -> dict[str, int]:
     """Line → pieces, own parts with a star, configured copies with their values."""
     pieces: Counter[str] = Counter()
     for entry in found.entries:
-        pieces[f"{entry.object_name}, {entry.variant}" if entry.variant else entry.object_name] += (
-            entry.quantity
-        )
+        name = f"{entry.object_name}, {entry.variant}" if entry.variant else entry.object_name
+        pieces[f"{name} (own number)" if entry.is_own_item else name] += entry.quantity
     for own in found.assembly.own:
         pieces[f"*{own.object_name}"] += own.quantity
     return dict(pieces)

@@ -19,6 +19,7 @@ from silo.bom.walk.kinds import Kind
 from silo.fcstd.container import ContainerFile, Inflater, ZipEntry
 from silo.fcstd.errors import FcstdError
 from silo.fcstd.objects import FcstdObject
+from silo.fcstd.old_view import visible_in
 from silo.fcstd.properties import Properties, table_of
 from silo.fcstd.survey import FileSurvey
 from silo.fcstd.type_tree import ancestors
@@ -301,6 +302,19 @@ class FcstdDocument:
             return any(self.content.directory.entries(_VIEW))
         except ValueError as error:
             raise FcstdError(self.FileName, str(error)) from error
+
+    @cached_property
+    def old_view(self) -> Mapping[str, bool]:
+        """Return which objects the view shows, for a file that says it nowhere else; {} if it has no view, or
+        a damaged one.
+        """
+        entry = self._entries.get(_VIEW)
+        if entry is None or entry.size > self._xml.limits.side_entry:
+            return {}
+        try:
+            return visible_in(self._side_entry(entry))
+        except FcstdError:  # FreeCAD opens the file without its view
+            return {}
 
     @cached_property
     def _entries(self) -> dict[bytes, ZipEntry]:

@@ -38,6 +38,7 @@ _KINDS: dict[str, type] = {
     "VisibilityList": tuple,
 }
 
+_VISIBILITY = "Visibility"
 _ALIKE = frozenset({"ElementCount", "LinkCopyOnChange", "Scale", "ScaleVector", "Visibility"})
 
 
@@ -132,6 +133,9 @@ class FcstdObject:
                 return mine[name]
         properties: Properties = mine["properties"]
         if name not in properties.numbers:
+            if name == _VISIBILITY and (shown := self.Document.old_view.get(self.Name)) is not None:
+                mine[name] = shown
+                return shown
             raise AttributeError(name)
         # The file does not change while it is open, so the next access need not call this.
         piece = properties.piece(name)
@@ -147,7 +151,8 @@ class FcstdObject:
             self._load()
         if name in mine:
             return mine[name]
-        return getattr(self, name, default) if name in mine["properties"].numbers else default
+        has_it = name in mine["properties"].numbers or name == _VISIBILITY
+        return getattr(self, name, default) if has_it else default
 
     def unload(self) -> None:
         """Forget what was read of the object; it is read again when it is needed."""

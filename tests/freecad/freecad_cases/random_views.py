@@ -22,6 +22,8 @@ import Draft
 import FreeCAD as App
 import Part
 
+NUMBER = "00000000-0000-4000-8000-00000000000b"
+
 
 class View:
     """One assembly with its parts.
@@ -40,6 +42,7 @@ class View:
         self.named: list[str] = []
         self.left_out: list[Any] = []
         self.number = 0
+        self.is_numbered = False
 
     def build(self) -> None:
         self.parts = [self.part(number) for number in range(3)]
@@ -59,6 +62,7 @@ class View:
                 [
                     *(self.own_box, self.plain_link, self.elements, self.clone, self.cut, self.cut_of_link),
                     *(self.sweep, self.reference, self.configured, self.draft_array, self.compound),
+                    *(self.weldment, self.measured, self.pad_on_a_face),
                 ]
             )
             self.put(holder, scene())
@@ -264,9 +268,52 @@ class View:
         if tall != 3:
             link.Height = tall
         self.doc.recompute()
-        self.right["Part2" if tall == 3 else f"Part2, Height = {tall} mm"] += 1
+        if tall == 4:  # these have an item of their own, which one of their links says
+            link.addProperty("App::PropertyString", "SiloItemId", "Silo")
+            link.SiloItemId = "" if self.is_numbered else NUMBER
+            self.is_numbered = True
+        number = " (own number)" if tall == 4 else ""
+        self.right["Part2" if tall == 3 else f"Part2, Height = {tall} mm{number}"] += 1
         self.weighs.append((link, 1))
         return [link]
+
+    def weldment(self) -> list[Any]:
+        """Two linked parts that are joined here: they count, and what is weighed is their union."""
+        links = [self.link(), self.link()]
+        welded = self.doc.addObject("Part::MultiFuse", self.name("Welded"))
+        welded.Shapes = links
+        for link in links:
+            link.Visibility = False
+            self.count(link, 1, weighed=False)
+        self.weighs.append((welded, 1))
+        self.named.append(welded.Name)
+        return [*links, welded]
+
+    def measured(self) -> list[Any]:
+        """A link from which an expression takes a size; a hidden one is only a reference."""
+        link, box = self.link(), self.box(self.doc, self.name("Sized"))
+        box.setExpression("Height", f"{link.Name}.Placement.Base.x / 1000 + 4")
+        if self.hide(link):
+            self.named.append(link.Name)
+        else:
+            self.count(link, 1)
+        self.own(box)
+        return [link, box]
+
+    def pad_on_a_face(self) -> list[Any]:
+        """A body that grows from the face of another uses that face, not the body."""
+        base, other = (
+            self.body(self.name("Ground")),
+            self.doc.addObject("PartDesign::Body", self.name("Tower")),
+        )
+        self.doc.recompute()
+        pad = self.doc.addObject("PartDesign::Pad", self.name("Pad"))
+        other.addObject(pad)
+        pad.Profile, pad.Length = (base, ["Face6"]), self.random.uniform(3, 9)
+        self.hide(base, 0.3)
+        self.own(base)
+        self.own(other)
+        return [base, other]
 
     def draft_array(self) -> list[Any]:
         """Three of a box or of a link; the original is hidden, and an element may be left out."""

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """What features take of other objects: a solid that lives on in the result, a tool that cuts, or a mere look.
 
-* Consumed is the operand of a cut, a boolean, a fusion, a fillet. The tool of a cut is consumed as well, but
-  its solid does not live on.
+* Consumed is the operand of a cut, a boolean, a fusion, a fillet, and what a PartDesign feature outside a
+  Body grows from. The tool of a cut is consumed as well, but its solid does not live on.
 * Use is not consumption: a sweep's spine, a face that a pad grows from, the inputs of a section, the body
   that a PartDesign *Clone* shows once more.
 * Where a view was saved, what the view shows is a piece, whatever uses it (:class:`Consumers`).
@@ -14,7 +14,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator
 from enum import Enum, auto
 from typing import Any, Generic, NamedTuple, TypeVar
 
-from silo.bom.walk.document import derived, is_element_name, own
+from silo.bom.walk.document import derived, first_of, is_element_name, own
 
 T = TypeVar("T", bound=Hashable)
 
@@ -96,6 +96,8 @@ def operands(feature: Any) -> Iterator[Operand]:
         names = (*_OPERANDS, "Group")
     else:
         names = _OPERANDS
+    if (grown := _grown_from(feature)) is not None:
+        yield Operand(grown, Taking.SOLID)
     cuts_group = own(feature, "Type") in (_CUT, "Cut")
     for name in names:
         how = Taking.TOOL if (is_cut and name in _TOOLS) or (name == "Group" and cuts_group) else Taking.SOLID
@@ -110,6 +112,19 @@ def operands(feature: Any) -> Iterator[Operand]:
                 continue
             is_clone = name == "BaseFeature" and derived(operand, "PartDesign::Body")
             yield Operand(operand, Taking.COPY if is_clone else how)
+
+
+def _grown_from(feature: Any) -> Any:
+    """Return the feature on whose face a PartDesign feature without a Body grows (FreeCAD before 0.17): its
+    solid lives on. None for any other feature.
+    """
+    if not derived(feature, "PartDesign::Feature") or own(feature, "BaseFeature") is not None:
+        return None
+    sketch = first_of(own(feature, "Sketch") or own(feature, "Profile"))
+    support = own(sketch, "Support") or own(sketch, "AttachmentSupport")
+    face = support[0] if isinstance(support, list) and support else support
+    grown = first_of(face)
+    return grown if derived(grown, "PartDesign::Feature") else None
 
 
 def _is_pair(first: Any, second: Any) -> bool:

@@ -19,7 +19,7 @@ from silo.bom.errors import DocumentError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.key import Key
 from silo.bom.message import message
-from silo.bom.walk.document import LinkProblem, object_name
+from silo.bom.walk.document import LinkProblem, object_name, own, saved_by
 from silo.bom.walk.links import extract, why
 from silo.bom.walk.roots import choose_assembly
 from silo.bom.walk.targets import is_assembly_link, is_link
@@ -34,6 +34,8 @@ from silo.workbench.freecad.stored_links import stored_target
 # A document type declaration stands before the root element, which FreeCAD writes within some hundred bytes.
 _BEFORE_ROOT = 1 << 16
 
+# From this FreeCAD on Document.xml says what is hidden.
+_VIEW_IN_DOCUMENT = (0, 19)
 # The first FreeCAD with an Assembly workbench of its own.
 ASSEMBLY_SINCE = (0, 22)
 
@@ -46,16 +48,33 @@ def read(path: str, assembly: str | None = None, *, hardware: bool = True) -> Ex
 def read_checked(path: str, assembly: str | None = None, *, hardware: bool = True) -> Extraction:
     """Do what :func:`read` does, but do not open a file that could harm FreeCAD.
 
-    If FreeCAD only says that it cannot open a file, the error has the reason that our reader finds.
+    If FreeCAD only says that it cannot open a file, the error has the reason that our reader finds. A FreeCAD
+    without a window shows what the file shows, also of old files.
     """
     from silo.fcstd import Library
 
     _refuse_entities(path)
     try:
-        return read(path, assembly, hardware=hardware)
+        document = open_fully(path)
+        if not host.has_gui():
+            _show_as_saved()
+        return extract_live(document, assembly, hardware=hardware)
     except DocumentError:
         Library().open(path)
         raise
+
+
+def _show_as_saved() -> None:
+    """Hide what the view of an old file hides: a FreeCAD without a window reads no view."""
+    from silo.fcstd import Library
+
+    old = [doc for doc in host.documents() if () < saved_by(doc.getProgramVersion()) < _VIEW_IN_DOCUMENT]
+    with Library() as library:
+        for doc in old:
+            saved = library.open(doc.FileName)
+            for obj in doc.Objects:
+                if own(saved.getObject(obj.Name), "Visibility", True) is False:
+                    obj.Visibility = False
 
 
 def _refuse_entities(path: str) -> None:
