@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import gc
 import importlib.util
 import os
@@ -12,7 +11,6 @@ import signal
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -48,41 +46,7 @@ for name in ("no_proxy", "NO_PROXY"):
     os.environ[name] = ",".join(filter(None, (os.environ.get(name), "127.0.0.1,localhost,::1")))
 
 # A password costs a server 0.2 s of processor, because people guess passwords. Tests would take minutes more.
-with suppress(ImportError):
-    from argon2 import PasswordHasher
-
-    PasswordHasher.__init__.__defaults__ = (1, 8, 1, *PasswordHasher.__init__.__defaults__[3:])
-
-# uvicorn looks ten times a second if it is to end, and waits as long again for its connections. Tests end
-# hundreds of servers.
-with suppress(ImportError):
-    import uvicorn.server
-
-    class _Quick:
-        """asyncio with short pauses."""
-
-        def __getattr__(self, name: str) -> Any:
-            return getattr(asyncio, name)
-
-        @staticmethod
-        async def sleep(seconds: float) -> None:
-            await asyncio.sleep(seconds / 10)
-
-    uvicorn.server.asyncio = _Quick()
-
-# FastAPI works out its 200 routes anew for each application. They are the same for all servers of the tests.
-with suppress(ImportError):
-    from fastapi.routing import _EffectiveRouteContext as _Route
-
-    _made: dict[tuple[int, str], _Route] = {}
-
-    def _route(*, original_route: Any, include_context: Any, _make: Any = _Route.from_api_route) -> _Route:
-        key = (id(original_route), include_context.prefix)
-        if key not in _made:
-            _made[key] = _make(original_route=original_route, include_context=include_context)
-        return _made[key]
-
-    _Route.from_api_route = _route  # type: ignore[method-assign, assignment]
+os.environ["SILO_PASSWORD_MEMORY"] = "12"
 
 # A tenth of the time went into looking for garbage: tests make many objects, and hardly any are garbage.
 gc.set_threshold(100_000, 50, 100)

@@ -58,6 +58,7 @@ from silo_server.db.state import mode_of, put_state
 from silo_server.db.tables import (
     FILE_REFERENCES,
     api_tokens,
+    device_logins,
     events,
     items,
     login_attempts,
@@ -81,7 +82,9 @@ BACKED_UP = "backed_up"
 # When a backup was last restored to see that it can be, and which.
 RESTORE_TRIED = "restore_tried"
 # Tables that a restore changes itself: it logs everybody out, and notes that it was done.
-_ALTERED = frozenset({"sessions", "login_links", "login_attempts", "events", "audit", "server_state"})
+_ALTERED = frozenset(
+    {"sessions", "login_links", "device_logins", "login_attempts", "events", "audit", "server_state"}
+)
 PAGE = 5000
 CHUNK = 1024 * 1024
 # A restored server gives its events ids that none had before, so that every listener, even one that saw more
@@ -337,7 +340,7 @@ def _replace_rows(reader: Connection, tx: Tx, made: Manifest, report: Report) ->
     for target in reversed(metadata.sorted_tables):
         tx.conn.execute(target.delete())
     for target in metadata.sorted_tables:
-        if target in (sessions, login_links, login_attempts):
+        if target in (sessions, login_links, device_logins, login_attempts):
             continue  # a restore lets no one in who would not be let in by it now
         count = _copy_rows(reader, select(target), tx, target)
         report(f"{target.name}: {count} rows")

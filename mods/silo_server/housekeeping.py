@@ -32,6 +32,7 @@ from silo_server.db.tables import (
     audit,
     bom_change_lines,
     bom_changes,
+    device_logins,
     login_attempts,
     login_links,
     models,
@@ -228,6 +229,7 @@ def _models(tx: Tx) -> int:
 _STEPS: dict[str, Step] = {
     "sessions": _old(sessions, "id_hash", "expires_at", lambda tx: tx.at),
     "login links": _old(login_links, "token_hash", "expires_at", lambda tx: tx.at),
+    "logins of programs": _old(device_logins, "device_hash", "expires_at", lambda tx: tx.at),
     "login attempts": _old(
         login_attempts,
         "id",

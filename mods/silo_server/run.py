@@ -139,6 +139,7 @@ def routers() -> tuple[APIRouter, ...]:
     """Import and return all routers; late, as this takes half of the import, and a backup needs none."""
     from silo_server.routes import (
         attachments,
+        device_logins,
         items,
         orders,
         parts_table,
@@ -168,6 +169,7 @@ def routers() -> tuple[APIRouter, ...]:
         system.router,
         streams.router,
         sessions.router,
+        device_logins.router,
         tokens.router,
         user_routes.router,
         parts_table.router,
@@ -196,7 +198,9 @@ def routers() -> tuple[APIRouter, ...]:
 def create_app(settings: Settings, clock: Clock = utc_now) -> FastAPI:
     """Make the server as an ASGI application; :func:`prepare` has brought the database up to date."""
     from silo_server.routes.call import Server, find_user
+    from silo_server.services.access.passwords import password_memory
 
+    password_memory(os.environ)  # an unusable number is named at the start, not at the first login
     db = Database(settings, clock)
 
     @asynccontextmanager

@@ -145,7 +145,9 @@ def test_the_tree_says_what_each_row_weighs_and_costs(machine: dict[str, str], v
     expect(row(page, machine["module"]).locator("td.number")).to_have_text(
         ["10", "2", "2", "1.5 kg", "3 kg", "6.00 EUR", "12.00 EUR"]
     )
-    expect(row(page, machine["plate"]).locator("td.number")).to_have_text(["1", "1", "–", "–", "–", "–"])
+    expect(row(page, machine["plate"]).locator("td.number")).to_have_text(
+        ["20", "1", "1", "–", "–", "–", "–"]
+    )
     page.get_by_label("For how many").fill("10")
     page.get_by_role("button", name="Show").click()
     expect(row(page, machine["screw"]).locator("td.number")).to_have_text(

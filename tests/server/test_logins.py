@@ -15,7 +15,7 @@ from server_testing import Databases
 from sqlalchemy import func, select
 
 from silo.bom.errors import AuthError, BusyError, ConfigError
-from silo_server.actors import Actor, Role
+from silo_server.actors import Role
 from silo_server.db.database import Database
 from silo_server.db.tables import api_tokens, login_attempts, users
 from silo_server.errors import TooManyAttemptsError
@@ -27,7 +27,6 @@ from silo_server.services.access.sessions import log_in
 from silo_server.services.access.tokens import (
     actor_by_token,
     create_token,
-    let_program_in,
     list_tokens,
     revoke_token,
 )
@@ -219,14 +218,6 @@ def test_a_new_secret_of_the_environment_replaces_its_predecessor(door: Door) ->
         create_item(tx, NewItem(part_number="P-1"))
     door.later(-3600)
     assert any("The clock is behind" in warning for warning in prepare(door.db, SECOND).warnings)
-
-
-def test_a_program_that_is_let_in_twice_has_one_token(door: Door) -> None:
-    """The page was sent twice: the program's secret is the same."""
-    for _ in range(2):
-        with door.db.write(Actor("admin", Role.ADMIN, 1)) as tx:
-            let_program_in(tx, "FreeCAD on here", "ab" * 32)
-            assert [token.name for token in list_tokens(tx)].count("FreeCAD on here") == 1
 
 
 def test_a_lock_out_keeps_when_a_token_was_revoked_before(door: Door) -> None:

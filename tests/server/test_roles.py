@@ -16,7 +16,7 @@ from silo_server.web.pages import ROUTERS
 VIEWER, EDITOR, ADMIN = ROLES
 # The contract (silo-contract §1.1): reading is for viewers, changing for editors. These are the exceptions.
 PUBLIC = {f"{method} {path}" for method in ("GET", "OPTIONS") for path in ("/health", "/ready")}
-PUBLIC |= {"POST /api/auth/login"}
+PUBLIC |= {"POST /api/auth/login", "POST /api/auth/device", "POST /api/auth/device/token"}
 # Public unless the site asks for a login (tests/server/test_system.py).
 PUBLIC |= {"GET /api/openapi.json"}
 # Asked last: after that, no credential of the caller lets in any more.

@@ -4,12 +4,11 @@
 from __future__ import annotations
 
 import base64
-import hashlib
 import json
 import re
 import zlib
 from collections.abc import Iterator
-from urllib.parse import unquote, urlencode
+from urllib.parse import quote, unquote, urlencode
 
 import pytest
 from fastapi.routing import APIRoute
@@ -17,6 +16,8 @@ from server_testing import Api, sqlite_database
 from starlette.datastructures import FormData
 from web_visitor import FORM, HTML, ROLES, Visitor, enter, link_of
 
+from silo.api.client import SiloClient
+from silo.bom.errors import AuthError
 from silo_server.run import RunningServer, running_server
 from silo_server.services.access.signing import signing_key
 from silo_server.settings import Settings
@@ -33,7 +34,7 @@ PUBLIC = {
     *("GET /login/link/{secret}", "POST /login/link/{secret}"),
 }
 OF_VIEWERS = {
-    *("POST /login/program", "POST /logout", "POST /mine/follow", "POST /mine/seen", "POST /account/tokens"),
+    *("POST /login/device", "POST /logout", "POST /mine/follow", "POST /mine/seen", "POST /account/tokens"),
     *("POST /account/tokens/{token_id}/revoke", "POST /account/password"),
     "POST /account/logout-everywhere",
     # These two need the right to approve, whatever the role.
@@ -98,26 +99,50 @@ def test_every_form_needs_its_secret(visitors: dict[str, Visitor]) -> None:
 
 
 def test_a_program_that_its_user_lets_in_has_a_token(visitors: dict[str, Visitor], api: Api) -> None:
-    """The page shows code and name; only the SHA-256 of the secret goes there. Twice sent is one token."""
-    secret = "silo_" + "5e" * 20
-    proof = hashlib.sha256(secret.encode()).hexdigest()
-    path = f"/login/program?name=FreeCAD%20on%20%3Cdesk%3E&proof={proof}"
-    page = visitors[EDITOR].get(path).body.decode()
-    assert f"{proof[:4]}-{proof[4:8]}".upper() in page
-    assert "FreeCAD on &lt;desk&gt;" in page
-    caller = api.as_(secret)
-    assert caller.call("GET", "/api/auth/me").status == 401
-    for _ in range(2):
-        answer = visitors[EDITOR].post(path)
+    """The page shows the program's own words as such, and the code; the client's login ends with a token."""
+    with SiloClient(api.base_url, None) as stranger:
+        login = stranger.begin_login("FreeCAD <b>and administrator</b>")
+        assert login is not None
+        assert stranger.asked_again(login).token == ""
+        path = login.page.removeprefix(api.base_url)
+        page = visitors[EDITOR].get(path).body.decode()
+        assert login.code in page
+        assert "FreeCAD &lt;b&gt;and administrator&lt;/b&gt;" in page
+        assert "127.0.0.1" in page
+        answer = visitors[EDITOR].post("/login/device", code=login.code.lower(), answer="allow")
         assert (answer.status, answer.headers["location"].partition("?")[0]) == (303, "/account")
+        token = stranger.asked_again(login).token
+        with pytest.raises(AuthError, match="begin again"):
+            stranger.asked_again(login)
+        other = stranger.begin_login("silo-mod")
+        assert other is not None
+        assert visitors[EDITOR].post("/login/device", code=other.code, answer="refuse").status == 303
+        with pytest.raises(AuthError, match="refused"):
+            stranger.asked_again(other)
+    caller = api.as_(token)
     assert caller.call("GET", "/api/auth/me").json()["username"] == EDITOR
-    mine = [one for one in caller.call("GET", "/api/auth/tokens").json() if "desk" in one["name"]]
-    (token,) = mine
-    assert "write" in token["scopes"]
-    assert token["expires_at"]
-    assert proof not in str(token)
-    for wrong in ("", "silo_secret", proof.upper(), proof + "0"):
-        assert visitors[EDITOR].post(f"/login/program?name=x&proof={wrong}").status == 400
+    (made,) = [one for one in caller.call("GET", "/api/auth/tokens").json() if "FreeCAD" in one["name"]]
+    assert made["scopes"] == ["read", "write"]
+    assert made["expires_at"]
+
+
+def test_an_administrator_lets_no_program_administer(visitors: dict[str, Visitor], api: Api) -> None:
+    """The page says so."""
+    with SiloClient(api.base_url, None) as stranger:
+        login = stranger.begin_login("silo-mod")
+        assert login is not None
+        assert visitors[ADMIN].post("/login/device", code=login.code, answer="allow").status == 303
+        token = stranger.asked_again(login).token
+    assert api.as_(token).call("GET", "/api/users").status == 403
+    assert api.as_(token).call("POST", "/api/auth/tokens", {"name": "x", "scopes": ["admin"]}).status == 403
+
+
+def test_a_code_that_does_not_wait_is_named(visitors: dict[str, Visitor]) -> None:
+    """On the page as in the answer of its form."""
+    for code in ("BCDF-GHJK", "<script>", "0"):
+        assert visitors[EDITOR].get(f"/login/device?code={quote(code)}").status == 404
+        assert visitors[EDITOR].post("/login/device", code=code, answer="allow").status == 404
+    assert b"Type the code" in visitors[EDITOR].get("/login/device").body
 
 
 def test_a_login_form_from_another_site_is_refused(api: Api) -> None:

@@ -73,3 +73,16 @@ def test_times_are_in_the_zone_of_the_reader(api: Api, visitors: dict[str, Visit
         there = f"{when.astimezone(ZoneInfo(zone)):%Y-%m-%d %H:%M}"
         assert f'<time datetime="{at}">{there}</time>' in shown, cookie
         assert f'Times: <span class="zone">{zone}</span>' in shown
+
+
+def test_a_quantity_that_is_typed_into_an_order_is_noted(api: Api, visitors: dict[str, Visitor]) -> None:
+    """Another than the page showed, as its reader writes it."""
+    top, hose = api.item(), api.item(unit="m", properties={"standard_cost": 2.0})
+    api.add_line(top, hose, quantity=2)
+    for typed, cookies, noted in (("7", "", "7"), ("1,5", "silo_language=de", "1.5")):
+        shown = page(visitors[EDITOR], f"/items/{top}/order", cookies)
+        (fact,) = re.findall(r'name="chosen" form="bulk" value="(.*?})"', shown)
+        reader = replace(visitors[EDITOR], cookie=f"{visitors[EDITOR].cookie}; {cookies}")
+        answer = reader.post(f"/items/{top}/order", chosen=fact, **{f"quantity.{hose}.m": typed})
+        assert answer.status == 303, answer.body.decode()[:3000]
+        assert api.get(f"/api/items/{top}/orders")["orders"][0]["quantity"] == noted

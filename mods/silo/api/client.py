@@ -9,15 +9,13 @@ What comes back are the wire models, which also read as mappings. What goes wron
 
 from __future__ import annotations
 
-import hashlib
-import secrets
 import socket
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import closing, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Self
-from urllib.parse import quote
+from urllib.parse import quote, urlencode
 
 import requests
 
@@ -30,18 +28,33 @@ from silo.api.policy import Retries
 from silo.api.sse import ServerEvent
 from silo.api.tables import TableCalls
 from silo.api.transport import ApiCall, Cancel, Timeouts, Transport, stop_if
-from silo.api.wire import ServerState, SystemState, User, login_code
-from silo.bom.errors import SiloError
+from silo.api.wire import DeviceCodes, DeviceToken, ServerState, SystemState, User
+from silo.bom.errors import AuthError, SiloError
 from silo.bom.message import message
+
+DEVICE_GRANT = "urn:ietf:params:oauth:grant-type:device_code"
+# However seldom a server wants to be asked.
+MOST_INTERVAL_S = 30.0
 
 
 @dataclass(frozen=True)
 class BrowserLogin:
-    """A login that a user confirms: the token to come, the page to open, the code that both sides show."""
+    """A login that waits for a user (RFC 8628): the page to open, and the code that it asks for.
 
-    token: str
+    interval_s
+        the seconds to wait before each :meth:`SiloClient.asked_again`.
+    lives_s
+        how long the login waits in all.
+    token
+        "" until the user let the program in.
+    """
+
+    device_code: str
     page: str
     code: str
+    interval_s: float
+    lives_s: float
+    token: str = ""
 
 
 class SiloClient(ItemCalls, BomCalls, TableCalls):
@@ -138,23 +151,51 @@ class SiloClient(ItemCalls, BomCalls, TableCalls):
         return self._get(message("who we are"), "auth", "me").model(User)
 
     def begin_login(self, program: str) -> BrowserLogin | None:
-        """Make a secret and the page on which a user lets this program in; None if the server has no such
-        page.
-
-        The page shows the program and this computer. The program makes the secret itself, and the browser
-        carries only its SHA-256.
+        """Ask the server for a code, with which a user lets this program in on a page of the server; None if
+        the server has no such page.
         """
-        if not self.ready().browser_login:
+        if not self.ready().device_login:
             return None
-        secret = "silo_" + secrets.token_hex(20)
-        proof = hashlib.sha256(secret.encode()).hexdigest()
-        name = message(
-            "{program} on {gethostname}",
-            program=program,
-            gethostname=socket.gethostname() or message("this computer"),
+        asked = {"client_id": program, "machine": socket.gethostname()[:60]}
+        codes = self._transport.send(self._form("", asked)).model(DeviceCodes)
+        # The page is one of the server that was asked, whatever the answer says.
+        page = self.web_url(f"/login/device?code={quote(codes.user_code, safe='')}")
+        interval = min(max(codes.interval, 1.0), MOST_INTERVAL_S)
+        return BrowserLogin(codes.device_code, page, codes.user_code, interval, codes.expires_in)
+
+    def asked_again(self, login: BrowserLogin) -> BrowserLogin:
+        """Ask if the user let the program in, and return the login with its token if so.
+
+        Raises AuthError if the user refused, or the login is over.
+        """
+        asked = {"grant_type": DEVICE_GRANT, "device_code": login.device_code, "client_id": "silo-mod"}
+        call = self._form("/token", asked)
+        with self._transport.opened(call) as response:
+            reply = self._transport.reply(response, call)
+        answer = DeviceToken.model_validate(reply.mapping(accept=(400,)))
+        if answer.access_token:
+            return replace(login, token=answer.access_token)
+        if answer.error == "authorization_pending":
+            return login
+        if answer.error == "slow_down":  # by five seconds, as RFC 8628 has it
+            return replace(login, interval_s=min(login.interval_s + 5.0, MOST_INTERVAL_S))
+        if answer.error == "access_denied":
+            raise AuthError(message("the login was refused on the server's page"))
+        raise AuthError(
+            message(
+                "the login is over: nobody let the program in within {minutes} minutes; begin again",
+                minutes=round(login.lives_s / 60),
+            )
         )
-        page = f"/login/program?name={quote(name, safe='')}&proof={proof}"
-        return BrowserLogin(secret, self.web_url(page), login_code(proof))
+
+    def _form(self, path: str, fields: Mapping[str, str]) -> ApiCall:
+        return ApiCall(
+            "POST",
+            f"{self._address.web_root}/api/auth/device{path}",
+            message("a login"),
+            body=lambda: urlencode(fields),
+            headers={"Content-Type": "application/x-www-form-urlencoded"},
+        )
 
     @property
     def keeps_item_ids(self) -> bool:

@@ -830,8 +830,8 @@ class ServerState(Record):
 
     takes_item_ids
         a new item gets the UUID that the client proposes.
-    browser_login
-        the page ``/login/program`` lets a program in.
+    device_login
+        a program can be let in as RFC 8628 has it: ``POST /api/auth/device``.
     freecad
         the FreeCAD that the team works with, such as "1.0"; "" if not stated.
     """
@@ -841,7 +841,7 @@ class ServerState(Record):
     version: str = ""
     sse_clients: int | None = None
     takes_item_ids: bool = False
-    browser_login: bool = False
+    device_login: bool = False
     freecad: str = ""
 
 
@@ -883,6 +883,19 @@ class SystemState(Record):
     warnings: list[str] = []
 
 
-def login_code(proof: str) -> str:
-    """Return the code that a program and the page that lets it in both show, so that a user can compare."""
-    return f"{proof[:4]}-{proof[4:8]}".upper()
+class DeviceCodes(Answer):
+    """``POST /api/auth/device``, as RFC 8628, 3.2 has it. ``device_code`` is the program's secret."""
+
+    device_code: str = Field(min_length=1)
+    user_code: str
+    verification_uri: str
+    verification_uri_complete: str = ""
+    expires_in: float = 600
+    interval: float = 5
+
+
+class DeviceToken(Answer):
+    """``POST /api/auth/device/token``: the token, or why there is none (RFC 8628, 3.5)."""
+
+    access_token: str = ""
+    error: str = ""

@@ -906,6 +906,25 @@ def _find_numbers(op: Operations) -> None:
     op.add_column("items", Column("gone_find_numbers", Text))
 
 
+def _device_logins(op: Operations) -> None:
+    """Let programs wait for a user who types their code."""
+    op.create_table(
+        "device_logins",
+        primary("device_hash", String(64)),
+        needed("user_code", String(8), unique=True),
+        needed("program", Text),
+        needed("machine", Text),
+        needed("address", String(64)),
+        needed("asked_at", Stamp),
+        needed("expires_at", Stamp),
+        needed("refused", Boolean),
+        Column("polled_at", Stamp),
+        Column("user_id", Id, ForeignKey("users.id")),
+        Column("credential_id", Id, ForeignKey("credentials.id"), unique=True),
+        Column("token_expires_at", Stamp),
+    )
+
+
 STEPS: dict[str, Callable[[Operations], None]] = {
     "0007": _first_schema,
     "0008": _answers,
@@ -926,4 +945,5 @@ STEPS: dict[str, Callable[[Operations], None]] = {
     "0024": _graded_costs,
     "0025": _exact_quantities,
     "0026": _find_numbers,
+    "0027": _device_logins,
 }

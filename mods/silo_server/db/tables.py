@@ -529,6 +529,24 @@ login_links = Table(
     needed("credential_id", Id, ForeignKey("credentials.id"), unique=True),
 )
 
+device_logins = Table(
+    "device_logins",
+    metadata,
+    primary("device_hash", String(64)),
+    needed("user_code", String(8), unique=True),
+    needed("program", Text),
+    needed("machine", Text),
+    needed("address", String(64)),
+    needed("asked_at", Stamp),
+    needed("expires_at", Stamp),
+    needed("refused", Boolean),
+    Column("polled_at", Stamp),
+    # Of the user who let the program in, until it fetches its token.
+    Column("user_id", Id, ForeignKey("users.id")),
+    Column("credential_id", Id, ForeignKey("credentials.id"), unique=True),
+    Column("token_expires_at", Stamp),
+)
+
 login_attempts = Table(
     "login_attempts",
     metadata,

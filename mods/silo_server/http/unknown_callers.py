@@ -27,7 +27,7 @@ from silo_server.http.errors import answer_of
 UNKNOWN_BODY = 64 * KIB
 MOST_FOR_AN_ADDRESS = 16
 # Where a caller becomes known, so that no credential can be wanted.
-LETS_IN = re.compile(r"/login(?:/.*)?|/language|/api/auth/login")
+LETS_IN = re.compile(r"/login(?:/.*)?|/language|/api/auth/(?:login|device(?:/token)?)")
 # In the scope: what the caller is counted under, None for a caller who is not known.
 CALLER = "silo.caller"
 

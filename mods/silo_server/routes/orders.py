@@ -50,6 +50,8 @@ def _exact(value: object) -> object:
         if reading.value is None:
             raise ValueError(reading.problem)
         return reading.value
+    if isinstance(value, Decimal):  # of a page, which reads numbers as its reader types them
+        return value
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError("wanted a number, or a number as text")
     return as_decimal(value)

@@ -72,7 +72,7 @@ async def ready(server: ServerDep) -> Response:
         "files": state.files,
         "sse_clients": server.hub.listeners,
         "takes_item_ids": True,
-        "browser_login": True,
+        "device_login": True,
         "freecad": server.settings.freecad_version,
     }
     return json_answer(body, 200 if state.ready else 503)

@@ -17,7 +17,6 @@ import anyio.to_thread
 from fastapi import APIRouter, Depends, Path, Query, Request
 from starlette.responses import RedirectResponse, Response
 
-from silo.api.wire import login_code
 from silo.bom.errors import AuthError, ConflictError, ForbiddenError, RejectedError, SiloError
 from silo_server.actors import Actor, Role, Scope
 from silo_server.db.state import mode_of
@@ -40,7 +39,7 @@ from silo_server.routes.sessions import set_session_cookie
 from silo_server.routes.tokens import revoke
 from silo_server.routes.users import login_path
 from silo_server.services import audit
-from silo_server.services.access import sessions, tokens, users
+from silo_server.services.access import sessions, users
 from silo_server.services.access.login_links import use_login_link
 from silo_server.services.access.passwords import MIN_PASSWORD
 from silo_server.services.access.sessions import NewSession, actor_by_session, set_own_password
@@ -247,24 +246,6 @@ def use_link(request: Request, server: ServerDep, secret: str, form: Form) -> Re
             return back(target)
         return _login_page(request, target, str(error), 401)
     return _with_session(request, session, target)
-
-
-ProgramName = Annotated[str, Query(min_length=1, max_length=100)]
-Proof = Annotated[str, Query(pattern="^[0-9a-f]{64}$")]
-
-
-@router.get("/login/program")
-def ask_for_program(call: Reader, name: ProgramName, proof: Proof) -> Response:
-    """Ask whether a program on the person's computer may come in."""
-    return page(call, "login_program.html", name=name, proof=proof, code=login_code(proof))
-
-
-@router.post("/login/program")
-def let_program_in(call: Reader, name: ProgramName, proof: Proof) -> Response:
-    """Make a token for a program, which alone knows its secret: only the SHA-256 came here."""
-    with call.write(even_when_read_only=True) as tx:
-        tokens.let_program_in(tx, name, proof)
-    return back("/account", _("%(name)s is logged in. You may close this page.", name=name))
 
 
 @router.post("/logout")

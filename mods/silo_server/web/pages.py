@@ -27,6 +27,7 @@ from silo_server.web import (
     accounts,
     activity_page,
     attachments,
+    device_page,
     import_page,
     item_edit_page,
     item_page,
@@ -51,6 +52,7 @@ from silo_server.web.render import (
 
 ROUTERS = (
     accounts.router,
+    device_page.router,
     item_edit_page.router,  # before item_page: /items/new is no part number
     item_page.router,
     print_page.router,

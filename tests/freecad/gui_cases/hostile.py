@@ -122,7 +122,7 @@ def preview(one: Any) -> None:
     tell(selected=len(Gui.Selection.getSelection()))
     window.missing.setChecked(True)
     window.sync_button.click()
-    wait(lambda: boxes("BOM Updated") and settled())
+    wait(lambda: boxes("BOM Updated") and settled(), seconds=400)
     wait(lambda: any("BOM Updated" in text for text in labels(one.dock)))
     window.close()
     tell(synced=boxes("BOM Updated"), pane_after=look(one.dock, "pane-after"))

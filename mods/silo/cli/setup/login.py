@@ -9,11 +9,10 @@ import os
 import sys
 import time
 import webbrowser
-from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from silo import caption, spoken
-from silo.bom.errors import AuthError, Exit, InputError, RouteMissingError, SiloError
+from silo.bom.errors import Exit, InputError, RouteMissingError, SiloError
 from silo.bom.message import message
 from silo.cli.connection import account_of, client_of
 from silo.cli.json_output import print_json
@@ -69,9 +68,6 @@ def run_logout(args: argparse.Namespace) -> int:
         if os.environ.get("SILO_API_TOKEN"):
             print(caption("SILO_API_TOKEN still has a token."))
     return Exit.DONE
-
-
-LOGIN_SECONDS = 600
 
 
 def add_login(parser: argparse.ArgumentParser) -> None:
@@ -168,18 +164,11 @@ def _token_by_browser(args: argparse.Namespace) -> str:
         file=sys.stderr,
     )
     webbrowser.open(login.page)
-    with SiloClient(where.url, login.token, verify=where.verify) as client:
-        for _ in range(LOGIN_SECONDS):
-            with suppress(AuthError):
-                client.whoami()
-                return login.token
-            time.sleep(1)
-    raise AuthError(
-        message(
-            "nobody let silo-mod in within {login_seconds} minutes; begin again",
-            login_seconds=LOGIN_SECONDS // 60,
-        )
-    )
+    with SiloClient(where.url, None, verify=where.verify) as client:
+        while not login.token:
+            time.sleep(login.interval_s)
+            login = client.asked_again(login)
+    return login.token
 
 
 def _token(url: str) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from silo.bom.errors import AuthError, ConfigError
+from silo.bom.errors import ConfigError
 from silo.workbench.settings.keyring import Keyring
 from silo.workbench.settings.server import ServerChoice, ServerPreferences, SettingSource, choose_server
 from silo.workbench.words import plain, translate
@@ -73,16 +73,14 @@ def begin_login(wanted: ServerPreferences, preferences: ServerPreferences) -> Br
     return login
 
 
-def is_let_in(login: BrowserLogin, wanted: ServerPreferences, preferences: ServerPreferences) -> bool:
-    """Return True if the user has let FreeCAD in. Worker."""
+def asked_again(
+    login: BrowserLogin, wanted: ServerPreferences, preferences: ServerPreferences
+) -> BrowserLogin:
+    """Ask if the user has let FreeCAD in; the login has its token then. Worker."""
     from silo.api.client import SiloClient
 
-    with SiloClient(wanted.url or preferences.url, login.token, verify=wanted.verify) as client:
-        try:
-            client.whoami()
-        except AuthError:
-            return False
-    return True
+    with SiloClient(wanted.url or preferences.url, None, verify=wanted.verify) as client:
+        return client.asked_again(login)
 
 
 def in_use(server: ServerChoice, env: Mapping[str, str]) -> str:

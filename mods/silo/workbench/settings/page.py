@@ -12,7 +12,7 @@ from silo.workbench.gui import qt, widgets
 from silo.workbench.gui.choices import choice_box
 from silo.workbench.gui.qt import QtCore, QtWidgets
 from silo.workbench.session.session import Session
-from silo.workbench.settings.connection_test import begin_login, in_use, is_let_in, keep_token, look, test
+from silo.workbench.settings.connection_test import asked_again, begin_login, in_use, keep_token, look, test
 from silo.workbench.settings.keyring import Keyring
 from silo.workbench.settings.preferences import ALLOW, HOLD, Preferences
 from silo.workbench.settings.server import ServerChoice, ServerPreferences, read_known
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 
 # How often the server is asked if the user has let FreeCAD in.
-LOGIN_MS = 1500
 KEYRING, PREFERENCE = "keyring", "preference"
 
 
@@ -239,17 +238,18 @@ class PreferencePage:
             )
             if not qt.open_url(login.page):
                 self._tell(login.page, Tone.QUIET)
-            ask(login)
+            ask_later(login)
+
+        def ask_later(login: BrowserLogin) -> None:
+            qt.later(round(1000 * login.interval_s), lambda: ask(login) if self._alive else None)
 
         def ask(login: BrowserLogin) -> None:
             title = translate("Silo", "Waiting for the browser")
-            self._ask(
-                title, lambda: is_let_in(login, wanted, preferences), lambda done: answered(login, done)
-            )
+            self._ask(title, lambda: asked_again(login, wanted, preferences), answered)
 
-        def answered(login: BrowserLogin, done: bool) -> None:
-            if not done:
-                qt.later(LOGIN_MS, lambda: ask(login) if self._alive else None)
+        def answered(login: BrowserLogin) -> None:
+            if not login.token:
+                ask_later(login)
                 return
             self.token.setText(login.token)
             self._tell(translate("Silo", "You are logged in. Press OK to keep the token."), Tone.GOOD)

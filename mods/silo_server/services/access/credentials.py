@@ -14,7 +14,7 @@ from enum import StrEnum
 
 from sqlalchemy import delete, insert, select, update
 
-from silo_server.db.tables import api_tokens, credentials, login_links, sessions, users
+from silo_server.db.tables import api_tokens, credentials, device_logins, login_links, sessions, users
 from silo_server.db.transaction import Tx
 
 
@@ -94,7 +94,10 @@ def _alive(tx: Tx) -> set[int]:
     )
     begun = select(sessions.c.credential_id).where(sessions.c.expires_at > tx.stamp)
     links = select(login_links.c.credential_id).where(login_links.c.expires_at > tx.stamp)
-    return {each for query in (tokens, begun, links) for each in tx.conn.scalars(query)}
+    allowed = select(device_logins.c.credential_id).where(
+        device_logins.c.credential_id.is_not(None), device_logins.c.expires_at > tx.stamp
+    )
+    return {each for query in (tokens, begun, links, allowed) for each in tx.conn.scalars(query)}
 
 
 def end_below(tx: Tx, roots: Collection[int], *, themselves: bool = False) -> int:
@@ -108,6 +111,7 @@ def end_below(tx: Tx, roots: Collection[int], *, themselves: bool = False) -> in
         )
         tx.conn.execute(delete(sessions).where(sessions.c.credential_id == each))
         tx.conn.execute(delete(login_links).where(login_links.c.credential_id == each))
+        tx.conn.execute(delete(device_logins).where(device_logins.c.credential_id == each))
     if ended:
         tx.end_access()
     return len(ended)

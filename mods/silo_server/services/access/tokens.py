@@ -50,9 +50,6 @@ LAST_USE_SECONDS = 60
 # A form that is sent twice comes twice within this time.
 REPEAT_SECONDS = 60
 
-# A program that was let in by its user asks again after so many days.
-PROGRAM_DAYS = 90
-
 
 @dataclass(frozen=True, slots=True)
 class Parent:
@@ -111,7 +108,6 @@ def create_own_token(
     forever: bool,
     scope: Scope | None = None,
     secret: str | None = None,
-    hashed: str = "",
 ) -> tuple[Token, str]:
     """Make a token for the caller. A token cannot make one that lives longer or may do more than itself.
 
@@ -119,8 +115,6 @@ def create_own_token(
         its lifetime [days]; with neither it lives as long as the token that makes it.
     secret
         of :func:`secret_of_form`, whose token may have been made a moment ago.
-    hashed
-        of a secret that only a program knows; the secret that is returned is then empty.
     Raises ForbiddenError; ConflictError if the form was sent long ago.
     """
     actor = tx.actor
@@ -139,16 +133,7 @@ def create_own_token(
         expires = expires or actor.expires_at
     if secret is not None and (token := _made_before(tx, actor.own_id, secret)) is not None:
         return token, secret
-    return create_token(
-        tx, actor.own_id, name, expires=expires, scope=scope or actor.scope, secret=secret, hashed=hashed
-    )
-
-
-def let_program_in(tx: Tx, name: str, hashed: str) -> None:
-    """Make a token for a program that sent the SHA-256 of its own secret; only one for each secret."""
-    tx.lock(hashed)
-    if tx.conn.scalar(select(api_tokens.c.id).where(api_tokens.c.token_hash == hashed)) is None:
-        create_own_token(tx, name, days=PROGRAM_DAYS, forever=False, scope=Scope.WRITE, hashed=hashed)
+    return create_token(tx, actor.own_id, name, expires=expires, scope=scope or actor.scope, secret=secret)
 
 
 def _made_before(tx: Tx, user_id: int, secret: str) -> Token | None:
@@ -178,18 +163,24 @@ def create_token(
     expires: str | None = None,
     secret: str | None = None,
     scope: Scope = Scope.ADMIN,
-    hashed: str = "",
 ) -> tuple[Token, str]:
     """Make a token for a user; return it with its secret, which is never shown again."""
-    secret = "" if hashed else secret or PREFIX + secrets.token_hex(20)
-    parent = tx.actor.credential_id
-    credential = new_credential(tx, Kind.TOKEN, user_id, name, parent)
-    token_id = tx.conn.execute(
+    secret = secret or PREFIX + secrets.token_hex(20)
+    credential = new_credential(tx, Kind.TOKEN, user_id, name, tx.actor.credential_id)
+    token_id = add_token(tx, user_id, name, secret, credential=credential, scope=scope, expires=expires)
+    return next(t for t in list_tokens(tx, user_id) if t.id == token_id), secret
+
+
+def add_token(
+    tx: Tx, user_id: int, name: str, secret: str, *, credential: int, scope: Scope, expires: str | None
+) -> int:
+    """Store a token under a credential that there is; return its id."""
+    token_id: int = tx.conn.execute(
         insert(api_tokens)
         .values(
             user_id=user_id,
             name=name,
-            token_hash=hashed or secret_hash(secret),
+            token_hash=secret_hash(secret),
             prefix=shown_prefix(secret) or PREFIX,
             scope=scope.value,
             created_at=tx.stamp,
@@ -199,7 +190,7 @@ def create_token(
         .returning(api_tokens.c.id)
     ).scalar_one()
     note(tx, "token.created", name)
-    return next(t for t in list_tokens(tx, user_id) if t.id == token_id), secret
+    return token_id
 
 
 def shown_prefix(secret: str) -> str:

@@ -16,7 +16,7 @@ from sqlalchemy import func, insert, select, update
 
 from silo.bom.errors import ConflictError, ForbiddenError, NotFoundError, RejectedError
 from silo_server.actors import Role
-from silo_server.db.tables import api_tokens, login_links, sessions, users
+from silo_server.db.tables import api_tokens, device_logins, login_links, sessions, users
 from silo_server.db.transaction import ADMIN_LOCK, Tx
 from silo_server.errors import DuplicateError
 from silo_server.fields import from_row
@@ -149,7 +149,7 @@ def change_user(
     if values := {name: value for name, value in given.items() if value is not None}:
         tx.conn.execute(update(users).where(users.c.id == user.id).values(**values))
         note(tx, "user.changed", user.username, _what_changed(user, values))
-    ended = [sessions] if password is not None or active is False else []
+    ended = [sessions, device_logins] if password is not None or active is False else []
     if ended or role not in (None, user.role):
         ended.append(login_links)
     if ended:
