@@ -135,3 +135,21 @@ def test_a_file_that_may_not_be_written_now_keeps_all_as_they_are(top: Path, tmp
         relink(*order, check=refuse)
     assert top.read_bytes() == before
     assert relink(*order, dry_run=True, check=refuse)
+
+
+def test_an_import_of_a2plus_leads_to_the_new_file(tmp_path: Path) -> None:
+    """Its file is a text of a property; other texts stay."""
+    (tmp_path / "new").mkdir()
+    Doc().add("Part::Box", "Box").save(tmp_path / "new/part.FCStd")
+    doc = Doc()
+    for name, file in (("A", "./part.FCStd"), ("B", ".\\part.FCStd"), ("C", "./other.FCStd")):
+        doc.add("Part::FeaturePython", name, sourceFile=file, a2p_Version="V0.4", note="./part.FCStd")
+    top = doc.save(tmp_path / "top.FCStd")
+    (done,) = relink([top], tmp_path / "part.FCStd", tmp_path / "new/part.FCStd")
+    assert done.links == 2
+    read = {obj.Name: (obj.sourceFile, obj.note) for obj in open_document(top).Objects}
+    assert read == {
+        "A": ("new/part.FCStd", "./part.FCStd"),
+        "B": ("new/part.FCStd", "./part.FCStd"),
+        "C": ("./other.FCStd", "./part.FCStd"),
+    }

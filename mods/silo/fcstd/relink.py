@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Lead the links of FreeCAD files to a file that has moved.
+"""Lead the links of FreeCAD files, and the imports of A2plus, to a file that has moved.
 
 FreeCAD has no way to repair a link whose target has moved but to make it again, which loses placements and
 joints. Here only the recorded path changes: object, sub-names and the rest of the file stay as they are.
@@ -25,6 +25,9 @@ from silo.fcstd.linked import TAGS
 from silo.fcstd.repack import replaced_entry
 
 _FILE = re.compile(rb"""(\sfile\s*=\s*)("[^"]*"|'[^']*')""")
+_VALUE = re.compile(rb"""(\svalue\s*=\s*)("[^"]*"|'[^']*')""")
+# A property of A2plus records the file of an import as a text.
+_IMPORTED = "sourceFile"
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,7 @@ class Relinked:
 class _Record(NamedTuple):
     at: int
     name: str
+    attribute: re.Pattern[bytes] = _FILE
 
 
 def relink(
@@ -90,10 +94,15 @@ def _records(text: bytes, path: str, file: str, limits: Limits) -> Iterator[_Rec
     if as_utf8(text) is not text:
         raise Malformed(message("is not in UTF-8"))
     folder, wanted = os.path.dirname(path), {file, os.path.realpath(file)}
-    for at, attributes in start_tags(text, limits.depth, TAGS):
-        recorded = attributes.get("file", "")
+    named = ""
+    for at, attributes in start_tags(text, limits.depth, {*TAGS, "Property", "String"}):
+        if "type" in attributes:  # a property, with its value after it
+            named = attributes.get("name", "")
+            continue
+        is_import = named == _IMPORTED and "value" in attributes
+        recorded = attributes.get("value" if is_import else "file", "")
         if recorded and not wanted.isdisjoint(_spellings(recorded, folder)):
-            yield _Record(at, attributes.get("name", ""))
+            yield _Record(at, "", _VALUE) if is_import else _Record(at, attributes.get("name", ""))
 
 
 def _spellings(recorded: str, folder: str) -> Iterator[str]:
@@ -125,7 +134,7 @@ def _mend(relinked: Relinked, old: str, target: str, limits: Limits) -> None:
     def edit(text: bytes) -> bytes:
         parts, begin = [], 0
         for record in _records(text, relinked.path, old, limits):
-            attribute = _FILE.search(text, record.at)
+            attribute = record.attribute.search(text, record.at)
             if attribute is None:
                 raise Malformed(message("has a link that cannot be edited"))
             parts += [text[begin : attribute.end(1)], b'"%b"' % in_attribute(recorded).encode()]

@@ -307,9 +307,12 @@ class View:
             self.doc.addObject("PartDesign::Body", self.name("Tower")),
         )
         self.doc.recompute()
+        binder = self.doc.addObject("PartDesign::SubShapeBinder", self.name("Face"))
+        other.addObject(binder)
+        binder.Support = [(base, ("Face6",))]
         pad = self.doc.addObject("PartDesign::Pad", self.name("Pad"))
         other.addObject(pad)
-        pad.Profile, pad.Length = (base, ["Face6"]), self.random.uniform(3, 9)
+        pad.Profile, pad.Length = binder, self.random.uniform(3, 9)
         self.hide(base, 0.3)
         self.own(base)
         self.own(other)

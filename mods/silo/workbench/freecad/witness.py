@@ -29,7 +29,8 @@ from silo.bom.walk.tree import Tree
 from silo.workbench.freecad import host
 from silo.workbench.freecad.live import LinkInspector, cached_document, canonical_paths
 
-# What is shown and not counted, on purpose: a finding of one of these names the object.
+# What is shown and not counted, on purpose: a finding of one of these names the object. So does an error of
+# a file that a link wants, since the view may show what it kept.
 _NAMED_SHOWN = frozenset(
     {
         *(FindingCode.CONSUMED, FindingCode.MODIFIED_HERE, FindingCode.COINCIDENT, FindingCode.NO_HARDWARE),
@@ -170,7 +171,7 @@ class _Witness:
         for finding in extraction.findings:
             for place in finding.where:
                 path = self._canonical(place.doc_path)
-                if finding.code in _NAMED_SHOWN:
+                if finding.code in _NAMED_SHOWN or (finding.file and finding.blocks):
                     self._named_shown.add((path, place.obj))
                 if finding.code in _NAMED_HIDDEN:
                     self._named_hidden.add((path, place.obj))
