@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import errno
 
-from silo.bom.message import message
+from silo.bom.message import Message, message
 
 _REASONS = {
     errno.ENOENT: message("there is no such file or folder"),
@@ -53,6 +53,8 @@ def why_refused(error: Exception) -> str:
         return message("it is no text in UTF-8")
     if not isinstance(error, OSError) or error.errno is None or not error.strerror:
         return str(error)
+    if isinstance(error.strerror, Message):
+        return error.strerror  # raised by us, with a reason that says more
     if getattr(error, "winerror", None) in _SHARING:
         return _REASONS[errno.EBUSY]
     if (reason := _REASONS.get(error.errno)) is not None:
