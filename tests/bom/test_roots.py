@@ -10,6 +10,7 @@ from fakes import BareDocument, Doc, edit
 
 from silo.bom import FindingCode, choose_assembly, extract
 from silo.bom.errors import InputError
+from silo.bom.walk.links import file_bom
 from silo.bom.walk.roots import find_assemblies
 
 BOLT = ("/v/bolt.FCStd", "Body")
@@ -235,3 +236,17 @@ def test_the_likeliest_assembly_comes_first_whatever_the_order() -> None:
     named = doc.part("Named", Type="Assembly")
     real = doc.assembly(name="Real")
     assert [obj.Name for obj in find_assemblies(doc)] == [real.Name, named.Name, far_part.Name, bare.Name]
+
+
+def test_an_assembly_that_lost_its_last_component_has_an_empty_bom(doc: Doc) -> None:
+    """So that the lines of the server are marked; a part that never had one has no BOM that could do so."""
+    doc.assembly()
+    _, extraction = file_bom(doc)
+    assert extraction is not None
+    assert extraction.entries == ()
+    model = Doc("/v/model.FCStd")
+    model.part("Model", Type="Assembly")
+    assert file_bom(model)[1] is not None
+    part = Doc("/v/part.FCStd")
+    part.part("Part", part.body())
+    assert file_bom(part)[1] is None
