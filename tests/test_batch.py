@@ -300,7 +300,7 @@ def test_a_report_has_what_changed_and_not_what_people_own(status: Status) -> No
         else [
             ("added", "1"),
             ("quantity", "? → 3"),
-            ("a person decides", "CAD 7, Silo 6"),
+            ("a reviewer decides", "CAD 7, Silo 6"),
             ("not in the assembly", "2"),
         ]
     )

@@ -280,7 +280,7 @@ STATUS_WORDS = {
 _CHANGES = {
     "added": "added",
     "quantity_changed": "quantity",
-    "conflicts": message("a person decides"),
+    "conflicts": message("a reviewer decides"),
     "removed": message("not in the assembly"),
 }
 

@@ -9,7 +9,7 @@ import pickle
 from hypothesis import given
 from hypothesis import strategies as st
 
-from silo.bom.message import Message, counted_message, from_json, joined, message
+from silo.bom.message import Message, carried, counted_message, from_carried, from_json, joined, message
 
 
 class German:
@@ -71,3 +71,14 @@ def test_json_has_the_values_of_the_sentence_and_no_others() -> None:
 def test_what_is_no_stored_message_is_none() -> None:
     for stored in ("a text", None, {"template": "{a}", "values": {}}, {"template": 1, "values": {}}):
         assert from_json(stored) is None
+
+
+@given(st.text(), st.text())
+def test_what_another_process_sends_is_said_in_the_language_of_this_one(file: str, plain: str) -> None:
+    """The reason of a file that FreeCAD could not open, say; a text of a stranger stays as it is."""
+    reason = message("The file {file} is missing", file=file)
+    sent = json.loads(json.dumps([carried(reason), carried(plain)]))
+    read = [from_carried(one) for one in sent]
+    assert read == [reason, plain]
+    assert isinstance(read[0], Message)
+    assert read[0].said(German()) == f"Die Datei {file} fehlt"

@@ -109,7 +109,7 @@ def test_a_person_s_quantity_becomes_an_override_that_merges_report(api: Api) ->
         {
             "type": "conflict",
             "part_number": a,
-            "message": "The assembly has 4, Silo has 6 (set by a person); a person decides",
+            "message": "The assembly has 4, Silo has 6 (set by a user); a reviewer decides",
             "assembly_quantity": 4,
             "server_quantity": 6,
         }

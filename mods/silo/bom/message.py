@@ -183,3 +183,13 @@ def read_beside(row: Mapping[str, Any], key: str = "message") -> str:
     text = row[key]
     made = from_json(row)
     return made if made is not None and made == text else str(text)
+
+
+def carried(text: str) -> str | dict[str, Any]:
+    """Write a message as JSON values for another process, and a plain text as it is."""
+    return text.as_json() if isinstance(text, Message) else text
+
+
+def from_carried(sent: object) -> str:
+    """Read what :func:`carried` wrote."""
+    return from_json(sent) or str(sent)

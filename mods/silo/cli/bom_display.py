@@ -39,7 +39,7 @@ _MARK = {
 _DIFFERENCE = {
     "added": ("+", "green", message("new in the assembly")),
     "quantity_changed": ("~", "yellow", message("quantity changed")),
-    "conflicts": ("⚡", "magenta", message("manual line; a person decides")),
+    "conflicts": ("⚡", "magenta", message("manual line; a reviewer decides")),
     "removed": ("⚠", "yellow", message("not referenced by the assembly; kept")),
     "kept": ("?", "red", message("its file is missing; the line is kept")),
     "manual": ("✎", "blue", message("manual line; not touched")),

@@ -25,7 +25,7 @@ from typing import IO, Any
 
 from silo.bom.entry import Extraction
 from silo.bom.errors import ConfigError, DocumentError, InputError, SiloError
-from silo.bom.message import message
+from silo.bom.message import from_carried, message
 from silo.bom.snapshot import from_plain
 from silo.bom.system_refusals import why_refused
 from silo.freecads.places import commands, exchange_folder, start
@@ -179,8 +179,8 @@ def _result(line: Mapping[str, Any]) -> Extraction | SiloError:
     if error is None:
         return from_plain(line["extraction"])
     if error.get("path") and error.get("reason"):
-        return DocumentError(error["path"], error["reason"])
-    return InputError(error["message"])
+        return DocumentError(error["path"], from_carried(error["reason"]))
+    return InputError(from_carried(error["message"]))
 
 
 @dataclass

@@ -35,6 +35,7 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from silo.bom.errors import ConfigError, DocumentError, Exit, InputError, SiloError, exit_of
+from silo.bom.message import carried
 from silo.files import documents_in
 from silo.freecads.job import job_text
 from silo.output_files import REPORTS, Output, beginning, check_outputs
@@ -165,7 +166,7 @@ def _write_lines(job: HeadlessJob, out: TextIO) -> int:
         _, result = next(extractions)
         if isinstance(result, SiloError):
             fine = False
-            _line(out, {"top": top, "error": error_json(result)})
+            _line(out, {"top": top, "error": carried_error(result)})
         else:
             record = {"witness": [account.as_dict() for account in seen]} if job.verify else {}
             _line(out, {"top": top, "extraction": to_plain(result), **record})
@@ -177,11 +178,13 @@ def _line(out: TextIO, data: Mapping[str, Any]) -> None:
     out.flush()
 
 
-def error_json(error: SiloError) -> dict[str, str]:
-    """Return an error as JSON values for the other process; a document's error has path and reason apart."""
+def carried_error(error: SiloError) -> dict[str, Any]:
+    """Write an error for the process that asked, which shows it in its own language; a document's error has
+    path and reason apart.
+    """
     path, reason = getattr(error, "path", None), getattr(error, "reason", None)
-    data = {"code": error.code, "message": str(error)}
-    return {**data, "path": path, "reason": reason} if isinstance(path, str) and reason else data
+    data = {"code": error.code, "message": carried(str(error))}
+    return {**data, "path": path, "reason": carried(reason)} if isinstance(path, str) and reason else data
 
 
 def _sync(job: HeadlessJob) -> int:
@@ -273,7 +276,7 @@ def _without_server(job: HeadlessJob, error: ImportError) -> int:
     )
     if job.json is not None:
         results = [
-            {"top": top, "error": error_json(silo_error)}
+            {"top": top, "error": carried_error(silo_error)}
             if isinstance(silo_error, SiloError)
             else {"top": top, "bom": bom_json(silo_error)}
             for top, silo_error in _each(documents_in(job.tops), job)

@@ -84,7 +84,7 @@ def conflict_warning(change: QuantityChange) -> dict[str, Any]:
         "type": "conflict",
         "part_number": change.part_number,
         "message": message(
-            "The assembly has {cad}, Silo has {kept} (set by a person); a person decides", cad=cad, kept=kept
+            "The assembly has {cad}, Silo has {kept} (set by a user); a reviewer decides", cad=cad, kept=kept
         ),
         "assembly_quantity": cad,
         "server_quantity": ours,

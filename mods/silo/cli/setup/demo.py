@@ -218,7 +218,7 @@ class Demo:
             self.out.print(activity_box(box))
 
     def _edit(self) -> None:
-        self.say(message("Edit: the cover goes, four more bolts come, a person adds glue in Silo"))
+        self.say(message("Edit: the cover goes, four more bolts come, a user adds glue in Silo"))
         remove_from_assembly(self.top, "Cover")
         before, after = set_element_count(self.top, "CoverBolts", added=4)
         number = resolve(read_assembly(str(self.top)), self.client).assembly.part_number or ""
@@ -240,7 +240,7 @@ class Demo:
         number = resolve(read_assembly(str(self.top)), self.client).assembly.part_number or ""
         self.page = self.client.web_url(f"/items/{number}/bom")
         self.out.print()
-        self.out.print(message("The page where a person decides: {page}", page=self.page), markup=False)
+        self.out.print(message("The page where a reviewer decides: {page}", page=self.page), markup=False)
 
     def stay(self) -> None:
         """Leave the server running, so that people can look at it."""

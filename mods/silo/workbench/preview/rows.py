@@ -214,7 +214,7 @@ def _notes() -> dict[RowKind, str]:
         RowKind.ADDED: translate("Silo", "new in the assembly: will be added"),
         RowKind.CHANGED: translate("Silo", "will take the assembly's quantity"),
         RowKind.CONFLICT: translate(
-            "Silo", "manual line in Silo with another quantity: a person decides there"
+            "Silo", "manual line in Silo with another quantity: a reviewer decides there"
         ),
         RowKind.UNREFERENCED: translate("Silo", "not in the assembly: kept, marked unreferenced"),
         RowKind.MANUAL: translate("Silo", "manual line: not touched"),

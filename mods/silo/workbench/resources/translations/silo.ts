@@ -1302,7 +1302,7 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../preview/rows.py" />
-            <source>manual line in Silo with another quantity: a person decides there</source>
+            <source>manual line in Silo with another quantity: a reviewer decides there</source>
             <translation type="unfinished" />
         </message>
         <message>

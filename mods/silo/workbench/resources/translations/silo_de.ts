@@ -1303,7 +1303,7 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../preview/rows.py" />
-            <source>manual line in Silo with another quantity: a person decides there</source>
+            <source>manual line in Silo with another quantity: a reviewer decides there</source>
             <translation>manuelle Position in Silo mit anderer Menge: dort entscheidet ein Mensch</translation>
         </message>
         <message>
