@@ -105,7 +105,7 @@ def findings() -> str:
     head = [
         "# Findings",
         "",
-        "What the walk through an assembly reports; [counting](../counting.md) has the rules, and",
+        "What the walk through an assembly reports; [the rules of counting](../counting-rules.md) say more, and",
         "[mass and inertia](../inertia.md) the warnings about masses.",
         "",
         "| code | severity | it is | do |",
