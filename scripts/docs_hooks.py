@@ -105,8 +105,8 @@ def findings() -> str:
     head = [
         "# Findings",
         "",
-        "What the walk through an assembly reports; [the rules of counting](../counting-rules.md) say more, and",
-        "[mass and inertia](../inertia.md) the warnings about masses.",
+        "What the walk through an assembly reports; [the rules of counting](../counting-rules.md) say more,",
+        "and [mass and inertia](../inertia.md) has the warnings about masses.",
         "",
         "| code | severity | it is | do |",
         "|---|---|---|---|",

@@ -28,7 +28,8 @@ def lines(found: Any) -> dict[str, int]:
     for entry in found.entries:
         value = entry.variant.removeprefix("Height = ").removesuffix(" mm")
         name = f"missing_{entry.object_name}" if entry.missing else entry.object_name
-        pieces[f"{name}_{value}" if value else name] += entry.quantity
+        number = "_item" if entry.is_own_item else ""
+        pieces[f"{name}_{value}{number}" if value else name] += entry.quantity
     for own in found.assembly.own:
         pieces[f"*{own.object_name}"] += own.quantity
     return dict(pieces)

@@ -166,6 +166,22 @@ def two_copies_with_equal_values(scene: Scene) -> None:
         scene.doc.recompute()
 
 
+@case(Plate=1, Plate_30=1, Plate_40_item=2)
+def copies_of_which_some_have_a_number(scene: Scene) -> None:
+    """The part has an identity, which its copies take along; one of two equal links has another."""
+    scene.plate.addProperty("App::PropertyString", "SiloItemId", "Silo")
+    scene.plate.SiloItemId = "00000000-0000-4000-8000-00000000000a"
+    scene.plate.Document.save()
+    for number, height in enumerate((10, 30, 40, 40)):
+        link = scene.link(f"Link{number}", at=20.0 * number)
+        link.LinkCopyOnChange = "Enabled"
+        if height != 10:
+            link.Height = height
+        scene.doc.recompute()
+    link.addProperty("App::PropertyString", "SiloItemId", "Silo")
+    link.SiloItemId = "00000000-0000-4000-8000-00000000000b"
+
+
 @case(missing_Link=1, Plate=1)
 def a_deleted_copy(scene: Scene) -> None:
     scene.link("Whole", at=50)
