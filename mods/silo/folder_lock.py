@@ -17,7 +17,7 @@ from typing import BinaryIO
 from silo.bom.errors import InputError
 from silo.bom.message import message
 from silo.bom.system_refusals import why_refused
-from silo.platform.locks import hold_lock, shows_locks
+from silo.platform.locks import hold_lock, shows_locks, stand_in
 from silo.platform.spelling import one_path
 from silo.platform.user_folders import cache_folder
 
@@ -34,8 +34,9 @@ def folder_lock(
 ) -> Iterator[str]:
     """Hold a folder alone; yields why other computers do not see that, "" if they do.
 
-    The lock is a file in the folder, if its disk supports locks, otherwise in the user's cache. It ends with
-    its process, however that ends; a file that a killed process left holds no lock.
+    The lock is a file in the folder, if its disk supports locks, otherwise in the user's cache, and otherwise
+    on this computer's own disk. It ends with its process, however that ends; a file that a killed process
+    left holds no lock.
 
     name, doing
         the lock's file; what is done to the folder ("synced"), for the message to another process.
@@ -58,9 +59,13 @@ def folder_lock(
         problem = why_refused(error)
         inner = cache_folder() / "locks" / f"{hashlib.sha256(os.fsencode(path)).hexdigest()[:32]}.lock"
         try:
-            inner.parent.mkdir(parents=True, exist_ok=True)
-            path = str(inner)
-            held = _held(path, folder, doing, patience, tell)
+            try:
+                inner.parent.mkdir(parents=True, exist_ok=True)
+                path = str(inner)
+                held = _held(path, folder, doing, patience, tell)
+            except OSError:  # the cache is on such a disk too
+                path = str(stand_in(path))
+                held = _held(path, folder, doing, patience, tell)
         except OSError:  # nowhere to lock at all
             yield problem
             return

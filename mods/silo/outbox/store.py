@@ -42,7 +42,7 @@ from silo.folder_lock import folder_lock
 from silo.outbox.entry import ASKED, SAME_PART, UNKNOWN, Commit, CommitFields, Entry, State, on_top
 from silo.outbox.held_here import HeldHere, held_row
 from silo.outbox.tables import SELECT, TABLES, VERSION, entry_of
-from silo.platform.locks import hold_lock
+from silo.platform.locks import has_locks, hold_lock_here
 from silo.platform.memory_file import read_memory
 from silo.platform.spelling import one_path
 from silo.platform.stamp import stamp_of
@@ -94,6 +94,7 @@ class QueueDatabase:
         self.closed = ""  # why nothing can be written there, if reading found that
         self._lock = threading.Lock()
         self._is_ready = False
+        self._has_locks = True  # of the disk
 
     @contextmanager
     def transaction(self) -> Iterator[sqlite3.Connection]:
@@ -107,7 +108,7 @@ class QueueDatabase:
         """Yield True in the one process and thread that may send now. The lock ends with its process."""
         self._make_ready()
         with self._translated():
-            lock = hold_lock(self.path.with_suffix(".lock"))
+            lock = hold_lock_here(self.path.with_suffix(".lock"))
         with lock or nullcontext():
             yield lock is not None
 
@@ -138,7 +139,10 @@ class QueueDatabase:
             yield db
 
     def _connect(self, path: Path | None = None) -> sqlite3.Connection:
-        db = sqlite3.connect(path or self.path, timeout=_PATIENCE_S, isolation_level=None)
+        if path is None and not self._has_locks:
+            db = _connect_alone(self.path)
+        else:
+            db = sqlite3.connect(path or self.path, timeout=_PATIENCE_S, isolation_level=None)
         db.row_factory = sqlite3.Row
         return db
 
@@ -151,9 +155,10 @@ class QueueDatabase:
             raise OutboxError(
                 message(
                     "{path}: the outbox cannot be used now ({error}). What waits in it is still "
-                    "there. Make room on the disk or fix its permissions, then try again",
+                    "there. {advice}",
                     path=self.path,
                     error=error,
+                    advice=_advice(error),
                 )
             ) from error
 
@@ -171,6 +176,7 @@ class QueueDatabase:
             for path in (self.path, self.path.with_suffix(".lock")):
                 private_file(path)
             sync_folder(self.path.parent)
+            self._has_locks = has_locks(self.path.with_suffix(".lock"))
         except OSError as error:
             waiting = len([*self.copies.glob("*.json")])
             text, again = message("Nothing was kept for sending"), message("commit again")
@@ -418,6 +424,42 @@ class FileOrigins(QueueDatabase):
         return target
 
 
+class _Alone(sqlite3.Connection):
+    """A connection to a database whose disk has no locks: a lock of this computer ends with it."""
+
+    lock: BinaryIO | None = None
+
+    def close(self) -> None:
+        super().close()
+        if self.lock is not None:
+            self.lock.close()
+
+
+def _connect_alone(path: Path) -> sqlite3.Connection:
+    until = time.monotonic() + _PATIENCE_S
+    while (lock := hold_lock_here(f"{path}.alone")) is None:
+        if time.monotonic() > until:
+            raise sqlite3.OperationalError(_LOCKED)
+        time.sleep(0.01)
+    try:
+        # Not "nolock": that refuses a database with a log, which it has from when its disk had locks.
+        address = f"{path.absolute().as_uri()}?vfs=unix-none"
+        db = sqlite3.connect(address, uri=True, isolation_level=None, factory=_Alone)
+        db.lock = lock
+        # SQLite reads that log alone, without memory that programs share.
+        db.execute("PRAGMA locking_mode = EXCLUSIVE")
+    except BaseException:
+        lock.close()
+        raise
+    return db
+
+
+def _advice(error: Exception) -> str:
+    if isinstance(error, sqlite3.OperationalError) and "locked" in str(error):
+        return message("Another program uses it for a long time: wait for it or end it, then try again")
+    return message("Make room on the disk or fix its permissions, then try again")
+
+
 @contextmanager
 def _transaction(db: sqlite3.Connection) -> Iterator[None]:
     db.execute("BEGIN IMMEDIATE")
@@ -435,6 +477,8 @@ _HELD_AGE = 3600.0
 
 # The folder of a second name that is a copy, if the disk has no second names.
 _COPIED = "copied"
+
+_LOCKED = "database is locked"  # as SQLite says it
 
 _PAUSE = "until, reason, code, failures, told"
 
@@ -512,7 +556,7 @@ class Store(FileOrigins):
                     self._coming[commit.key] = None
                     if self._held not in commit.file.parents:
                         self._held.mkdir(mode=0o700, exist_ok=True)
-                        self._coming[commit.key] = hold_lock(self._coming_lock(commit.key))
+                        self._coming[commit.key] = hold_lock_here(self._coming_lock(commit.key))
                 db.execute(f"INSERT INTO entry ({', '.join(row)}) VALUES (:{', :'.join(row)})", row)  # noqa: S608
                 self._describe(db, commit.key)
         except BaseException:
@@ -536,7 +580,7 @@ class Store(FileOrigins):
             return True
         path = self._coming_lock(key)
         with self._translated():
-            lock = hold_lock(path) if path.exists() else None
+            lock = hold_lock_here(path) if path.exists() else None
             if lock is None:
                 return path.exists()
             with lock, suppress(OSError):

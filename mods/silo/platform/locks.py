@@ -4,16 +4,22 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import importlib
 import os
 import re
+import stat
 import struct
+import tempfile
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, BinaryIO
 
 from silo.platform.system import NAME
 
 _LOCKED_BYTE = 1 << 30
+# What disks answer that have no locks: some network disks, as they are mounted.
+_NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP)
 
 
 def is_locked(path: str) -> bool | None:
@@ -73,6 +79,43 @@ def hold_lock(path: str | os.PathLike[str], *, shared: bool = False) -> BinaryIO
         ):
             return None
         raise
+
+
+def hold_lock_here(path: str | os.PathLike[str]) -> BinaryIO | None:
+    """Lock a file as :func:`hold_lock` does. If its disk has no locks, a file of this computer stands for it:
+    other programs of this computer see that lock, and other computers do not.
+    """
+    try:
+        return hold_lock(path)
+    except OSError as error:
+        if error.errno not in _NO_LOCKS:
+            raise
+    return hold_lock(stand_in(path))
+
+
+def has_locks(path: str | os.PathLike[str]) -> bool:
+    """Return False if the disk of a file has no locks. Raises OSError for anything else."""
+    try:
+        lock = hold_lock(path)
+    except OSError as error:
+        if error.errno not in _NO_LOCKS:
+            raise
+        return False
+    if lock is not None:
+        lock.close()
+    return True
+
+
+def stand_in(path: str | os.PathLike[str]) -> Path:
+    """Return the file on this computer's own disk that is locked in place of one whose disk has no locks."""
+    user = os.getuid() if hasattr(os, "getuid") else 0
+    folder = Path(tempfile.gettempdir(), f"silo-locks-{user}")
+    folder.mkdir(mode=0o700, exist_ok=True)
+    state = os.lstat(folder)
+    if not stat.S_ISDIR(state.st_mode) or (hasattr(os, "getuid") and state.st_uid != user):
+        raise OSError(errno.EACCES, os.strerror(errno.EACCES), str(folder))
+    name = hashlib.sha256(os.fsencode(os.path.realpath(path))).hexdigest()[:32]
+    return folder / f"{name}.lock"
 
 
 def shows_locks(path: str, mounts: str = "/proc/self/mountinfo") -> bool:

@@ -51,6 +51,7 @@ from silo.outbox.recorded import arrived
 from silo.outbox.store import Store
 from silo.platform.spelling import one_path
 from silo.project_folder import FileRecord, Project
+from silo.vault.former import documents_now, record_for
 from silo.vault.revisions import file_revisions
 
 if TYPE_CHECKING:
@@ -75,6 +76,9 @@ class ProjectFile:
         of the file (:mod:`silo.project_folder`).
     moved_from
         its place before, which is empty now.
+    former
+        the document that the file was until a user at another desk registered it, or made it another
+        document; ``document`` is what it became. "" where nothing like that happened.
     """
 
     path: str
@@ -88,11 +92,12 @@ class ProjectFile:
     problem: str = ""
     record: FileRecord | None = None
     moved_from: str = ""
+    former: str = ""
 
     @property
     def own_record(self) -> FileRecord | None:
-        """Return its record, if that is of the document that the file is now."""
-        return self.record if self.record is not None and self.record.is_of(self.document) else None
+        """Return its record, if that is of the document that the file is now, or of what that was before."""
+        return record_for(self.record, self.document, self.former)
 
 
 @dataclass(frozen=True)
@@ -355,6 +360,14 @@ def name_documents(belonging: Belonging, client: SiloClient | None, *, new: bool
         else replace(file, document=numbers.get(file.place) or (str(uuid4()) if new else ""))
         for file in belonging.files
     ]
+    documents = [file.record for file in files if not file.item and file.record is not None]
+    now = documents_now(documents, client) if client is not None else {}
+    files = [
+        replace(file, document=now[file.document], former=file.document)
+        if not file.item and file.document in now
+        else file
+        for file in files
+    ]
     named = {
         new.place: FileRecord(
             new.document, uid=new.uid, former=old.record.document if old.record is not None else ""
@@ -496,6 +509,8 @@ def commits(
         is_open = standing.state is FileState.SAME and (boms is None or file.place in boms)
         bom = file.bom if file.item and (wanted or is_open) else None
         if not wanted and bom is None:
+            continue
+        if file.former and standing.state in ON_TOP:  # without the part number that a colleague gave it
             continue
         commit = Commit(
             path=file.path,

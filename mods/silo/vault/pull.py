@@ -33,6 +33,7 @@ from silo.outbox.recorded import arrived, uid_of
 from silo.platform.spelling import folded, one_path
 from silo.platform.whole_files import replacing
 from silo.project_folder import FileRecord, Project, record_of
+from silo.vault.former import documents_now, record_for
 from silo.vault.tree import Fetched, FileTree, LostLink
 
 if TYPE_CHECKING:
@@ -168,7 +169,9 @@ def rules_of(
 
     def state(path: str, sha256: str, one: Fetched) -> FileState:
         record = record_of(path)
-        own = record if record is not None and record.is_of(one.item) else None
+        former = record.document if record is not None and not record.item else ""
+        now = documents_now([record], client) if record is not None and former else {}
+        own = record_for(record, one.item, former if now.get(former, "").lower() == one.item.lower() else "")
         revisions = one.revisions
         origins = store.origins(sha256, path, one.item, record=record)
         found = file_state(
@@ -292,9 +295,11 @@ def _place(one: Fetched, target: Path, rules: Rules) -> PulledFile:
                 stands = rules.state(str(target), there, one)
                 if stands is FileState.SET_BACK:
                     return done(PullState.SET_BACK)
-                if not rules.overwrite:
-                    return done(PullState.WAITING if stands is FileState.WAITING else PullState.EDITED)
-                state, kept = PullState.OVERWRITTEN, rules.keep(str(target))
+                # What is newer only was not edited: it was another document when it came here.
+                if stands is not FileState.NEWER:
+                    if not rules.overwrite:
+                        return done(PullState.WAITING if stands is FileState.WAITING else PullState.EDITED)
+                    state, kept = PullState.OVERWRITTEN, rules.keep(str(target))
         # Through a link to where the file is: another assembly may use it there.
         with one.content.open("rb") as read, replacing(real, mode=0o644) as write:
             shutil.copyfileobj(read, write, 1 << 20)

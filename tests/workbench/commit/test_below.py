@@ -236,3 +236,21 @@ def test_a_bom_that_was_held_goes_once_the_part_is_back(week: Week) -> None:
     (week.root / "away").rename(week.root / "Plate.FCStd")
     week.commit("Top")
     assert [line.child_name for line in week.office.silo.get_bom(number)] == ["Plate"]
+
+
+def test_what_silo_had_already_was_not_sent(week: Week) -> None:
+    """The committed file itself too: FreeCAD marked it, or the user commits it once more."""
+
+    def lines() -> dict[str, str]:
+        activity = week.office.session.shown.activity.entries
+        below = next(entry for entry in activity if entry.key.startswith("below:"))
+        return dict(line.text.split(": ") for line in below.lines)  # type: ignore[misc]
+
+    week.edit("Plate")
+    week.save("Plate")
+    week.commit("Top")
+    same = dict.fromkeys(("Plate.FCStd", "Sub.FCStd", "Skeleton.FCStd", "Top.FCStd"), "the same")
+    # Saving Top gives it nothing new: its bytes are those of its revision.
+    assert lines() == same | {"Plate.FCStd": "sent"}
+    week.commit("Top")
+    assert lines() == same

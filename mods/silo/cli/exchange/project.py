@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from silo.api.client import SiloClient
     from silo.bom.findings import Finding
+    from silo.outbox.entry import Entry
     from silo.outbox.report import Report, Sent
     from silo.vault.project import Belonging, FileStanding
 
@@ -75,74 +76,42 @@ def run_commit(args: argparse.Namespace) -> int:
     """Send what differs, through the queue. Returns 1 if anything is not in Silo afterwards, also what an
     earlier run left; 3 if the server does not answer: then the queue keeps everything.
     """
-    from silo.file_state import FileState
-    from silo.outbox.report import Report
-    from silo.outbox.send import send_all
     from silo.outbox.store import Store
-    from silo.vault.project import (
-        commits,
-        compare,
-        find_project,
-        free_held,
-        keep,
-        left_in_queue,
-        must_hold_files,
-        name_documents,
-        read_project,
-        remember,
-        retry_held,
-    )
+    from silo.vault.committing import commit_files
+    from silo.vault.project import find_project, must_hold_files, read_project
 
     project = find_project(args.tops, args.root)
     must_hold_files(args.tops, project)
     belonging = read_project(args.tops, project)
-    store = Store()
     away: UnreachableError | None = None
     with client_of(args) as client:
         try:
             reach(client)
         except UnreachableError as error:
             away = error
-        there = None if away else client
-        belonging = name_documents(belonging, there)
-        over = {file.path for file in belonging.files} if args.on_top else set()
-        retry_held(belonging, store, over)
-        standings = compare(belonging, there, store)
-        if not args.json:
-            _show(belonging, standings)
-        remember(belonging.project, standings, there)
-        if there is not None:
-            free_held(there, store, {file.path for file in belonging.files})
-        mine = set()
-        options = {"allow_missing": args.allow_missing, "over_newer": over}
-        for file, commit in commits(belonging, standings, comment=args.comment or "", **options):
-            keep(belonging.project, store, file, commit, client.base_url if there else "")
-            mine.add(commit.key)
-        report = (
-            Report(stopped_by=away)
-            if away
-            else send_all(store, client, force=True, on_progress=set_sending_step)
+        committed = commit_files(
+            belonging,
+            None if away else client,
+            Store(),
+            comment=args.comment or "",
+            allow_missing=args.allow_missing,
+            on_top=args.on_top,
+            away=away,
+            seen=_show if not args.json else lambda _belonging, _standings: None,
+            on_progress=set_sending_step,
         )
+        belonging, report = committed.belonging, committed.report
         models, undrawn = (0, []) if report.stopped_by else _send_models(belonging, client)
-        # What Silo has now proves the commit: whatever differs is not what a pull would bring.
-        after = compare(belonging, None if report.stopped_by else there, store)
-    left = left_in_queue(belonging, store, mine)
-    sent = _sent(report, mine)
-    waits = (FileState.WAITING, FileState.HELD)
-    behind = [one for one in after if one.state is not FileState.SAME and one.state not in waits and not away]
-    incomplete = [sent_row for sent_row in sent if sent_row["bom"] == "blocked"]
+    sent = _sent(committed.sent)
     if args.json:
-        waiting = [{"path": entry.label, "reason": entry.reason} for entry in left]
+        waiting = [{"path": entry.label, "reason": entry.reason} for entry in committed.left]
         result = {"sent": sent, "waiting": waiting, "models": models, "undrawn": undrawn}
-        print_json({**_status_json(belonging, standings), **result})
+        print_json({**_status_json(belonging, committed.before), **result})
     else:
-        _show_sent(report, sent, left, behind, belonging.project.root)
+        behind = [] if away else committed.behind
+        _show_sent(report, sent, committed.left, behind, belonging.project.root)
         _show_models(models, undrawn)
-    undone = [one for one in report.sent if one.entry.key in mine and one.undone]
-    done = not (
-        left or behind or incomplete or undone or _unsound(belonging) or report.stopped_by or report.busy
-    )
-    return exit_of(away) if away else Exit.DONE if done else Exit.UNDONE
+    return exit_of(away) if away else Exit.DONE if committed.done else Exit.UNDONE
 
 
 def _send_models(belonging: Belonging, client: SiloClient) -> tuple[int, list[str]]:
@@ -179,7 +148,7 @@ def _unsound(belonging: Belonging) -> bool:
     return bool(belonging.outside or belonging.unreadable)
 
 
-def _sent(report: Report, mine: set[str]) -> list[dict[str, Any]]:
+def _sent(arrived: Sequence[Sent]) -> list[dict[str, Any]]:
     return [
         {
             "path": file.entry.label,
@@ -189,8 +158,7 @@ def _sent(report: Report, mine: set[str]) -> list[dict[str, Any]]:
             "remark": file.conflict or file.entry.remark or draft_text(file.result or file.uploaded),
             "blocked_by": [one.message for one in _blocking(file)],
         }
-        for file in report.sent
-        if file.entry.key in mine
+        for file in arrived
     ]
 
 
@@ -201,7 +169,7 @@ def _blocking(sent: Sent) -> Sequence[Finding]:
     return blocking(sent.resolved) if sent.status == "blocked" and sent.resolved is not None else ()
 
 
-def _status_json(belonging: Belonging, standings: list[FileStanding]) -> dict[str, Any]:
+def _status_json(belonging: Belonging, standings: Sequence[FileStanding]) -> dict[str, Any]:
     return {
         "root": belonging.project.root,
         "files": [
@@ -248,7 +216,7 @@ _WORDS = {
 }
 
 
-def _show(belonging: Belonging, standings: list[FileStanding]) -> None:
+def _show(belonging: Belonging, standings: Sequence[FileStanding]) -> None:
     from rich.text import Text
 
     from silo.cli.terminal import console, plain
@@ -325,7 +293,7 @@ def _show(belonging: Belonging, standings: list[FileStanding]) -> None:
 
 
 def _show_sent(
-    report: Report, sent: list[dict[str, Any]], left: list[Any], behind: list[FileStanding], base: str
+    report: Report, sent: list[dict[str, Any]], left: Sequence[Entry], behind: list[FileStanding], base: str
 ) -> None:
     from rich.text import Text
 

@@ -21,7 +21,7 @@ def below_box(path: str, standings: Sequence[FileStanding], sent: Collection[str
     """Make the box: what is not in Silo as it is here comes first.
 
     sent
-        the files that this commit sends.
+        the files that this commit made a revision of.
     """
     lines = sorted((_line(one, sent) for one in standings), key=lambda line: _ORDER.index(line.tone))
     left = sum(line.tone is Tone.ERROR for line in lines)

@@ -176,7 +176,7 @@ class CommitFlow:
         over
             files that are sent on top of a colleague's newer revision.
         """
-        self._then(self._along(path, skip, comment, over))
+        self._then(self._along(path, skip, comment, over, time.monotonic()))
 
     def _then(self, steps: Iterator[CommittedDocument], comment: str = "") -> None:
         """Take these steps, a turn each, after those of an earlier commit."""
@@ -185,7 +185,7 @@ class CommitFlow:
             self._desk.later(self._turn)
 
     def _along(
-        self, path: str, skip: set[str], comment: str, over: Collection[str]
+        self, path: str, skip: set[str], comment: str, over: Collection[str], begun: float
     ) -> Iterator[CommittedDocument]:
         """Commit, a turn after the documents are saved, the linked files that Silo does not have."""
         how: dict[str, Any] = {"comment": comment, "over_newer": over}
@@ -201,7 +201,7 @@ class CommitFlow:
             if along.queued or along.more:
                 self._session.send(force=True)
             if along.standings:
-                self._prove(path, along, skip)
+                self._prove(path, along, begun)
 
         def failed(error: SiloError) -> None:
             self._tell_error(os.path.basename(path), str(error))
@@ -217,9 +217,15 @@ class CommitFlow:
         self._session.after_keeping(ask)
         yield from ()
 
-    def _prove(self, path: str, along: SentAlong, sent: set[str]) -> None:
-        """Look again after sending, and say of each file below whether Silo has it as it is here."""
-        paths = {one.file.path for one in along.standings if one.file.place in along.queued} | sent
+    def _prove(self, path: str, along: SentAlong, begun: float) -> None:
+        """Look again after sending, and say of each file below whether Silo has it as it is here.
+
+        begun
+            when the commit began: what became a revision since was sent by it.
+        """
+
+        def sent(standings: Iterable[FileStanding]) -> set[str]:
+            return {one.file.path for one in standings if self._session.has_sent(one.file.path, begun)}
 
         def look(client: Any, _control: Any) -> tuple[FileStanding, ...]:
             from silo.vault.project import find_project, stand  # late: FreeCAD's start waits for this module
@@ -228,11 +234,11 @@ class CommitFlow:
 
         def done(standings: tuple[FileStanding, ...]) -> None:
             if len(standings) > 1:
-                self._session.add(below_box(path, standings, paths))
+                self._session.add(below_box(path, standings, sent(standings)))
 
         def failed(_error: SiloError) -> None:  # without an answer, what was found before the sending counts
             if along.left_out:
-                self._session.add(below_box(path, along.standings, paths))
+                self._session.add(below_box(path, along.standings, sent(along.standings)))
 
         self._session.ask(translate("Silo", "Looking at what Silo has now"), look, done, failed)
 

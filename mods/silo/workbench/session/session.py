@@ -8,6 +8,7 @@ come back through ``deliver``. No widgets here, and no FreeCAD, so that all of i
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -79,6 +80,8 @@ class Session:
         self._looks = Worker("silo-looks", deliver, on_bug=bug)
         self._models = Worker("silo-models", deliver, on_bug=bug)
         self._undrawn: dict[Path, str] = {}
+        # Path → when its file last became a revision, in seconds of time.monotonic.
+        self._sent_at: dict[str, float] = {}
         self._online: Online | None = None
         self._live = False
         self._colleagues = Colleagues()
@@ -256,10 +259,18 @@ class Session:
     def _arrived(self, sent: Sent) -> None:
         if sent.revision is not None:
             self._colleagues.arrived(sent.entry.identity, sent.revision)
+            if sent.entry.has_file:
+                self._sent_at[sent.entry.path] = time.monotonic()
             self._show(newer=self._colleagues.newer)
         if sent.uploaded is not None and sent.entry.path:
             self._undrawn[Path(sent.entry.path)] = sent.entry.sha256
         self._listener.sent(sent)
+
+    def has_sent(self, path: str, since: float) -> bool:
+        """Return True if a file became a revision in Silo, from here, since a moment of
+        :func:`time.monotonic`; not if Silo had it already.
+        """
+        return self._sent_at.get(path, -1.0) >= since
 
     def _draw(self) -> None:
         """Draw the files that have arrived, so that Silo shows them in 3D; their commits are finished
