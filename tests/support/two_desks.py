@@ -785,7 +785,8 @@ class World:
                 pulled = place(tree, back)
             assert not pulled.lost, f"{one.name} was told nothing, but a pull lacks {pulled.lost}"
             for name in one.below(top):
-                there = back / f"{name}.FCStd"
+                # A file that was only renamed has its revision, and that the name of then.
+                there = pulled.top if name == top else back / f"{name}.FCStd"
                 assert there.exists(), f"{one.name} was told nothing, but a pull has no {name}"
                 assert there.read_bytes() == one.path(name).read_bytes(), (
                     f"{one.name} was told nothing: {name} differs"
