@@ -312,7 +312,7 @@ argument {argument}: not allowed with argument {other}|one of the arguments {arg
 reading|server|geometry|materials|BOM|results|links|working|calculating|reading {n} files
 Part number|Name|Quantity|Unit|Commit|What|Since|State|Why|In|Before|After|By|missing|added|removed
 quantity|line|data|file|updated|Errors|Warnings|Moved|Notes|Cancelled.|Stopped.|same|edited|waiting
-paused|moved|configuration|cache|identities|address|token|mode|who|items|schema|modules|events
+add-on|network|old|new|nothing|paused|moved|configuration|cache|identities|address|token|mode|who|items|schema|modules|events
 inertia|live|none|{n} merged|{n} unchanged|{n} dry run|{n} blocked|{n} unregistered|{n} failed
 {n} missing|{n} min|{n} hours|{n} days|in {n} s|in {n} min|in {n} hours|in {n} days|BOM merged
 BOM unchanged|BOM blocked|BOM unregistered|BOM failed|reading {n} s|server {n} s

@@ -434,7 +434,7 @@ class RunSummary:
         """
         several = ((words, files) for lines in (self.errors, self.warnings) for words, files in lines.items())
         return {
-            **{words: f"{words}{_others(words, files)}" for words, files in several},
+            **{words: joined("", (words, _others(words, files))) for words, files in several},
             **{line: message("{line}: no part number", line=line) for line in self._without_number()},
         }
 
@@ -543,8 +543,11 @@ class RunSummary:
                 )
             )
         if self.seconds:
-            times = ", ".join(f"{stage} {seconds:.1f} s" for stage, seconds in self.seconds.items())
-            notes.append(message("Time: {times}.", times=times))
+            times = [
+                message("{stage} {seconds} s", stage=_STAGES[stage], seconds=f"{seconds:.1f}")
+                for stage, seconds in self.seconds.items()
+            ]
+            notes.append(message("Time: {times}.", times=joined(", ", times)))
         return notes
 
     def _unknown(self) -> list[str]:
@@ -583,6 +586,10 @@ class RunSummary:
         return [FaultCause(cause, files) for cause, files in groups.items()]
 
 
+# The stages of a run, as a report of a night names them.
+_STAGES = {"reading": message("reading"), "server": message("server")}
+
+
 @dataclass(frozen=True)
 class FaultCause:
     """What several sentences of a run have in common; ``files``: file at fault → its sentences."""
@@ -599,8 +606,12 @@ def _first_ones(cause: FaultCause) -> str:
     """Write a cause in one line: its only sentence, or how many files are at fault, with three of them."""
     (first, *others), *more = cause.files.values()
     if not more:
-        return f"{first}{_more_places(others)}"
-    return _examples(f"{len(cause.files)} × {cause.words}", list(cause.files))
+        return joined("", (first, _more_places(others)))
+    return _examples(_counted_cause(cause), list(cause.files))
+
+
+def _counted_cause(cause: FaultCause) -> str:
+    return message("{count} × {cause}", count=len(cause.files), cause=cause.words)
 
 
 def _more_places(others: Sequence[str]) -> str:
@@ -610,12 +621,17 @@ def _more_places(others: Sequence[str]) -> str:
 def _whole(cause: FaultCause) -> tuple[str, list[str]]:
     """Write a cause as a line, and a line for each file at fault below it."""
     ways = [
-        f"{first.replace(f': {cause.words}', '')}{_more_places(others)}"
+        joined("", (_without_cause(first, cause.words), _more_places(others)))
         for first, *others in cause.files.values()
     ]
     if len(ways) == 1:
         return _first_ones(cause), []
-    return f"{len(ways)} × {cause.words}", ways
+    return _counted_cause(cause), ways
+
+
+def _without_cause(line: str, cause: str) -> str:
+    """Take the cause out of the line of a file, where it stands above."""
+    return shortened if (shortened := line.replace(f": {cause}", "")) != line else line
 
 
 def _examples(head: str, names: Sequence[str]) -> str:

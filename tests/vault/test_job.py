@@ -345,3 +345,20 @@ def test_a_worker_starts_without_the_network() -> None:
         "import sys, silo.vault.reading as _; print([n for n in ('http.client', 'ssl') if n in sys.modules])"
     )
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout == b"[]\n"
+
+
+def test_progress_counts_what_is_read(tmp_path: Path) -> None:
+    """Not what is asked for: when the last file is announced, it has been read."""
+    write(tmp_path, None, {0: {0: 1, 1: 1}})
+    tops = documents_in([str(tmp_path)])
+    seen: list[str] = []
+
+    def progress(path: str) -> None:
+        seen.append(path)
+        if len(seen) == len(tops):
+            for top in tops:
+                Path(top).write_bytes(b"")
+
+    with Index(None) as memory:
+        plan = make_plan(tops, VaultReader(memory), progress=progress)
+    assert (sorted(seen), plan.errors) == (sorted(tops), {})

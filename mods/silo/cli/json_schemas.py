@@ -16,15 +16,14 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, create_model
 
 import silo.inertia
 from silo.api.wire import MergeResult, OrderList, ProductSummary
-from silo.bom.errors import InputError
 from silo.bom.findings import FindingCode, Severity
 from silo.bom_sync.steps import Status
 
 
 def schema_of(name: str) -> dict[str, Any]:
-    """Return the schema of a command's JSON. InputError names all schemas."""
+    """Return the schema of a command's JSON; KeyError for a name that is not in ``NAMES``."""
     if name not in NAMES:
-        raise InputError(f"there is no schema {name!r}; there are: {', '.join(NAMES)}")
+        raise KeyError(name)
     if name in ("inertia", "mass"):
         text = Path(silo.inertia.__file__).with_name("schema.json").read_text(encoding="utf-8")
         schema: dict[str, Any] = json.loads(text)

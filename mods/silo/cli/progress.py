@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import itertools
 import sys
 import threading
 import time
@@ -94,6 +93,11 @@ def set_sending_step(entry: Entry, done: int, total: int) -> None:
 
 
 def count_steps(count: int) -> Callable[[str], None]:
-    """Return a function that shows the next of ``count`` steps, by its name."""
-    numbers = itertools.count(1)
-    return lambda name: set_step(f"[{next(numbers)}/{count}] {name}")
+    """Return a function that shows the next of ``count`` steps, by its name; a name counts once."""
+    seen: dict[str, None] = {}
+
+    def show(name: str) -> None:
+        seen.setdefault(name)
+        set_step(f"[{len(seen)}/{max(count, len(seen))}] {name}")
+
+    return show

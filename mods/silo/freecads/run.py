@@ -324,4 +324,4 @@ def _last_words(code: int, log: Path) -> tuple[str, str]:
     if crash := _CRASHED.search(text):
         code, text = -signal.Signals[crash[1]], text[: crash.start()]
     lines = [line.strip() for line in text.splitlines() if line.strip()]
-    return processes.how_it_ended(code), " / ".join(lines[-3:]) or "nothing"
+    return processes.how_it_ended(code), " / ".join(lines[-3:]) or message("nothing")

@@ -8,7 +8,7 @@ index, when an assembly's turn comes. So memory grows with the number of files, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from hashlib import blake2b
 from typing import Any
@@ -133,8 +133,7 @@ def make_plan(
     plan = Plan(list(tops))
     several: dict[Key, str] = {}
     below: dict[Key, str] = {}
-    asked_for = _announced(tops, progress)
-    answers = reading.ask_many(Question(top, assembly, hardware) for top in asked_for)
+    answers = reading.ask_many((Question(top, assembly, hardware) for top in tops), progress)
     for top, answer in zip(tops, answers, strict=True):
         error = _error(answer)
         if each and isinstance(error, SeveralAssembliesError):
@@ -173,12 +172,6 @@ def make_plan(
     _find_copies(plan)
     _find_meant(plan, reading)
     return plan
-
-
-def _announced(tops: Iterable[str], progress: Callable[[str], None]) -> Iterator[str]:
-    for top in tops:
-        progress(top)
-        yield top
 
 
 def _error(answer: WalkAnswer) -> SiloError | None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Future
 from dataclasses import dataclass
 from itertools import islice
@@ -107,15 +107,19 @@ class VaultReader:
             self.index.remember(question.path, question.name, answer)
         return WalkAnswer(question, answer)
 
-    def ask_many(self, questions: Iterable[Question]) -> Iterator[WalkAnswer]:
-        """Yield the answers in the order of the questions."""
+    def ask_many(
+        self, questions: Iterable[Question], progress: Callable[[str], None] = lambda _path: None
+    ) -> Iterator[WalkAnswer]:
+        """Yield the answers in the order of the questions; ``progress`` hears of each file that is read."""
         asked = list(questions)
         waiting: dict[int, StoredAnswer] = {}
         left: list[int] = []
         for number, answer in self._recalled(asked, range(len(asked))):
             if answer is None:
                 left.append(number)
-            elif len(waiting) < self._waiting:
+                continue
+            progress(asked[number].path)
+            if len(waiting) < self._waiting:
                 waiting[number] = answer
         self.asked += len(left)
         pool = self._pool if self._pool is not None and len(left) >= self._pool.worth else None
@@ -123,6 +127,7 @@ class VaultReader:
         contents, linked, held = dict[str, Content](), dict[int, FirstReading](), 0
         chunks = (_Chunk([asked[number] for number in group], None) for group in tapered(left, size, jobs))
         for number, first in zip(left, self._worked_on(chunks, pool), strict=True):
+            progress(asked[number].path)
             if first.facts:
                 self.index.remember_facts(first.path, first.facts)
             if first.known is not None:

@@ -105,7 +105,7 @@ class Notes:
             for name, value in values.items()
         }
         text = Message(sentence or code.sentence, {"obj": label_of(obj), **named})
-        if named.get("detail"):
+        if named.get("detail") and code is not FindingCode.LFS_POINTER:  # whose sentence says it all
             text = message("{text} ({detail})", text=text, detail=named["detail"])
         place = self.place(obj)
         made = _Note(severity or code.severity, text, code.tail if tail is None else tail)

@@ -170,12 +170,13 @@ def _where(line: LineChange, change: AssemblyChange) -> str:
 def _incomplete(state: FolderBoms, name: str) -> list[str]:
     words: list[str] = [
         message(
-            "{name}: {path} could not be read: {base}", name=name, path=path, base=shorten(why, state.base)
+            "{state}: {path} could not be read: {why}", state=name, path=path, why=shorten(why, state.base)
         )
         for path, why in state.unreadable
     ]
     words += [
-        message("{name}: {text}", name=name, text=shorten(one.message, state.base)) for one in state.findings
+        message("{state}: {text}", state=name, text=shorten(one.message, state.base))
+        for one in state.findings
     ]
     return words
 
@@ -208,7 +209,7 @@ def _show_changes(changes: tuple[AssemblyChange, ...], old: FolderBoms, new: Fol
     if not changes:
         text = spoken(_unchanged(old, new))
         out.print(Text(text, "green" if new.assemblies and new.complete else "yellow"))
-    for words in (*_incomplete(old, "old"), *_incomplete(new, "new")):
+    for words in (*_incomplete(old, message("old")), *_incomplete(new, message("new"))):
         out.print(Text("✗ ", "bold red").append(plain(spoken(words)), ""))
 
 
@@ -219,7 +220,7 @@ def _name(entry: BomEntry) -> str:
 def _unchanged(old: FolderBoms, new: FolderBoms) -> str:
     if not (old.assemblies or new.assemblies):
         return message("There is no assembly to compare, before or after.")
-    part = "" if old.complete and new.complete else message(" as far as they could be read")
+    part = "" if old.complete and new.complete else message(", as far as they could be read")
     return message(
         "No BOM changed{part}; assemblies compared: {count}.", part=part, count=len(new.assemblies)
     )
@@ -239,7 +240,7 @@ def _markdown(changes: tuple[AssemblyChange, ...], old: FolderBoms, new: FolderB
             words = (line.kind.replace("_", " "), _name(line.entry), _quantities(line), _where(line, change))
             lines.append(f"| {' | '.join(map(cell, words))} |")
         lines.append("")
-    incomplete = [*_incomplete(old, "old"), *_incomplete(new, "new")]
+    incomplete = [*_incomplete(old, message("old")), *_incomplete(new, message("new"))]
     if incomplete:
         lines += [message("### Not complete"), "", *(f"- {cell(words)}" for words in incomplete), ""]
     return "\n".join(lines).rstrip()

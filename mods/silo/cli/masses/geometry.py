@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from silo import spoken
 from silo.bom.errors import InputError
 from silo.bom.message import message
 from silo.cli.progress import set_step
@@ -55,10 +56,21 @@ def read_model(path: str, args: argparse.Namespace, **more: Any) -> Assembly:
     return assembly
 
 
+# The stages of a reader, in words of ours.
+_STAGES = {"reading": message("reading"), "measuring": message("measuring")}
+
+
+def _how_far(progress: Any) -> str:
+    stage = _STAGES.get(progress.stage, progress.stage)
+    if not progress.total:
+        return stage
+    return message("{stage} {done}/{total}", stage=stage, done=progress.done, total=progress.total)
+
+
 @contextmanager
 def _progress(name: str) -> Iterator[Any]:
     if not sys.stderr.isatty():
-        yield lambda progress: set_step(message("{name}: {progress}", name=name, progress=progress))
+        yield lambda progress: set_step(message("{name}: {progress}", name=name, progress=_how_far(progress)))
         return
     set_step("")  # the bar says it
     from rich.console import Console
@@ -72,9 +84,14 @@ def _progress(name: str) -> Iterator[Any]:
         transient=True,
     )
     with bar:
-        task = bar.add_task("reading", total=None, file=name)
+        task = bar.add_task(spoken(_STAGES["reading"]), total=None, file=name)
 
         def told(progress: Any) -> None:
-            bar.update(task, description=str(progress), completed=progress.done, total=progress.total or None)
+            bar.update(
+                task,
+                description=spoken(_how_far(progress)),
+                completed=progress.done,
+                total=progress.total or None,
+            )
 
         yield told

@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+from collections.abc import Set
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -202,14 +203,16 @@ def _read(args: argparse.Namespace) -> tuple[Extraction, frozenset[str], bool]:
                 file=sys.stderr,
             )
         extraction, unused = whole_folder(plan, reading, base, hardware=not args.no_hardware)
-        return extraction, unused, _tell_missing(extraction, base) or bool(plan.errors)
+        return extraction, unused, _tell_missing(extraction, base, set(plan.errors)) or bool(plan.errors)
 
 
-def _tell_missing(extraction: Extraction, base: str) -> bool:
-    """Report the missing files, which cannot be registered."""
+def _tell_missing(extraction: Extraction, base: str, unread: Set[str] = frozenset()) -> bool:
+    """Report the missing files, which cannot be registered; ``unread``: what was reported before."""
     from silo.cli.terminal import plain
 
     missing = {entry.doc_path for entry in walk_entries(extraction.entries) if entry.missing}
+    said = {relative(path, base) for path in unread}
+    missing = {path for path in missing if relative(path, base) not in said}
     for path in sorted(missing):
         print(
             message("silo-mod: {base} is left out: it is not there", base=plain(relative(path, base))),

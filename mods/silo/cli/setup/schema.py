@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import argparse
 
-from silo.bom.errors import Exit
+from silo.bom.errors import Exit, InputError
+from silo.bom.message import message
 from silo.cli.json_output import print_json, print_json_list
 
 
@@ -18,6 +19,14 @@ def run_schema(args: argparse.Namespace) -> int:
     from silo.cli.json_schemas import NAMES, schema_of
 
     if args.name is not None:
+        if args.name not in NAMES:
+            raise InputError(
+                message(
+                    "there is no schema {name}; there are: {names}",
+                    name=repr(args.name),
+                    names=", ".join(NAMES),
+                )
+            )
         print_json(schema_of(args.name))
     elif args.json:
         print_json_list(NAMES)

@@ -60,6 +60,14 @@ def read_link_map(path: Path | str) -> LinkMap:
     return link_map(_yaml(text, str(path)), str(path))
 
 
+def _where(error: Exception) -> str:
+    """Say in which line a YAML text is wrong; the parser's own words are about its tokens."""
+    mark = getattr(error, "problem_mark", None)
+    if mark is None:
+        return message("lists in lists without an end")
+    return message("line {line}, column {column}", line=mark.line + 1, column=mark.column + 1)
+
+
 def _yaml(text: str, source: str) -> Any:
     """Parse YAML into plain values (texts, lists and dicts), since a link may be called ``on`` or ``1.10``.
 
@@ -85,11 +93,7 @@ def _yaml(text: str, source: str) -> Any:
         data = yaml.load(text, Loader)
     except (yaml.YAMLError, RecursionError) as error:
         raise ConfigError(
-            message(
-                "{source}: this is not valid YAML ({error})",
-                source=source,
-                error=" ".join(str(error).split()),
-            )
+            message("{source}: this is not valid YAML ({where})", source=source, where=_where(error))
         ) from error
     if twice:
         raise ConfigError(

@@ -103,12 +103,20 @@ def _csv_rows(text: str, source: str) -> tuple[Material, ...]:
     return _checked(records, factor, source)
 
 
+def _where(error: tomllib.TOMLDecodeError) -> str:
+    """Say in which line a TOML text is wrong."""
+    place = re.search(r"line (\d+), column (\d+)", str(error))
+    if place is None:
+        return message("its end is missing")
+    return message("line {line}, column {column}", line=place[1], column=place[2])
+
+
 def _toml_records(text: str, source: str) -> Iterator[_Record]:
     try:
         table = tomllib.loads(text).get("materials", {})
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(
-            message("{source}: this is not valid TOML ({error})", source=source, error=error)
+            message("{source}: this is not valid TOML ({where})", source=source, where=_where(error))
         ) from error
     if not isinstance(table, dict) or not table:
         raise ConfigError(message("{source}: wanted a table [materials] with name = density", source=source))
