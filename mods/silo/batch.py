@@ -620,7 +620,7 @@ def _more_places(others: Sequence[str]) -> str:
 
 def _whole(cause: FaultCause) -> tuple[str, list[str]]:
     """Write a cause as a line, and a line for each file at fault below it."""
-    ways = [
+    ways: list[str] = [
         joined("", (_without_cause(first, cause.words), _more_places(others)))
         for first, *others in cause.files.values()
     ]
