@@ -51,6 +51,7 @@ from silo_server.housekeeping import keep_tidy, tidy
 from silo_server.http import errors
 from silo_server.http.body_limit import BodyLimit
 from silo_server.http.compression import Compressed
+from silo_server.http.escaped_slashes import EscapedSlashes
 from silo_server.http.headers import SecurityHeaders
 from silo_server.http.request_log import Observed, log_to_stderr
 from silo_server.http.unknown_callers import UnknownCallers
@@ -242,6 +243,7 @@ def create_app(settings: Settings, clock: Clock = utc_now) -> FastAPI:
     app.add_middleware(UnknownCallers, find_user=find_user)
     app.add_middleware(SecurityHeaders)
     app.add_middleware(Compressed)
+    app.add_middleware(EscapedSlashes)
     app.state.metrics = metrics
     app.openapi = lambda: _openapi(app)  # type: ignore[method-assign]
     return app

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from silo.api.address import ServerAddress, may_carry_token, origin_of
+from silo.api.address import ServerAddress, Word, may_carry_token, origin_of
 from silo.bom.errors import ConfigError, InputError
 
 
@@ -67,10 +67,13 @@ def test_a_password_in_an_address_is_refused_and_not_shown() -> None:
 
 
 def test_a_part_number_is_one_segment_whatever_it_holds() -> None:
-    """Slashes and blanks are quoted; dots alone would ask for another resource."""
+    """Slashes and blanks are quoted; dots alone, and words of the API, are escaped."""
     address = ServerAddress.parse("http://h")
     assert address.api("items", "A/1 ä?#", "bom") == "http://h/api/items/A%2F1%20%C3%A4%3F%23/bom"
-    for odd in ("", " ", ".", ".."):
+    assert address.api("items", "..") == "http://h/api/items/~2E~2E"
+    assert address.api("items", "search") == "http://h/api/items/~_search"
+    assert address.api("items", Word("search")) == "http://h/api/items/search"
+    for odd in ("", " "):
         with pytest.raises(InputError):
             address.api("items", odd)
 

@@ -13,6 +13,7 @@ from ipaddress import ip_address
 from urllib.parse import SplitResult, quote, urljoin, urlsplit
 
 from silo.bom.errors import ConfigError, InputError
+from silo.bom.items.part_address import part_segment
 from silo.bom.message import message
 
 _DEFAULT_PORTS = {"http": 80, "https": 443}
@@ -52,6 +53,12 @@ def canonical(url: str) -> str:
         return url.strip()
     bare = f"[{host}]" if ":" in host else host
     return f"{scheme}://{bare}:{port}{urlsplit(address.api_root).path}"
+
+
+class Word(str):
+    """A word of the API, where a part number could stand."""
+
+    __slots__ = ()
 
 
 @dataclass(frozen=True)
@@ -106,17 +113,15 @@ class ServerAddress:
         return name in _LOOPBACK or name.startswith("127.")
 
     def api(self, *segments: str) -> str:
-        """Return the URL of an API path; each segment is quoted, also the slash in a part number."""
-        for text in segments:
-            # Every HTTP library resolves "." and "..": such a part number would ask for something else.
-            if not text.strip(".") or not text.strip():
-                raise InputError(
-                    message(
-                        "{text} cannot be a part number or an identity: the server could not be asked for it",
-                        text=repr(text),
-                    )
-                )
-        return "/".join((self.api_root, *(quote(text, safe="") for text in segments)))
+        """Return the URL of an API path. Each segment is quoted, also the slash in a part number.
+
+        A :class:`Word` of the API stays as it is; a part number that is one, or dots alone, is escaped.
+        """
+        if not all(text.strip() for text in segments):
+            raise InputError(
+                message("a part number or an identity is empty: the server cannot be asked for it")
+            )
+        return "/".join((self.api_root, *map(_segment, segments)))
 
     def web(self, path: str) -> str:
         """Return the full URL of a page such as ``resolve_url``. Raises :class:`InputError` for a page of
@@ -130,6 +135,11 @@ class ServerAddress:
                 message("{url}: this page is not on {host}; it is not opened", url=url, host=self.host)
             )
         return url
+
+
+def _segment(text: str) -> str:
+    # Any server of this API reads a quoted slash; the other escapes are read by silo-mod's.
+    return quote(text, safe="") if isinstance(text, Word) or "/" in text else part_segment(text)
 
 
 def _one_spelling(host: str) -> str:

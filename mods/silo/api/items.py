@@ -8,6 +8,7 @@ from typing import Any
 
 from pydantic import Field
 
+from silo.api.address import Word
 from silo.api.caller import LISTS, Params, body
 from silo.api.files import FileCalls
 from silo.api.foreign import translated
@@ -91,7 +92,7 @@ class ItemCalls(FileCalls):
         if not uuid.strip(". ") or any(c in "/\\?#%" or c < " " for c in uuid):
             return None
         try:
-            item = self._get(message("item {uuid}", uuid=uuid), "items", "by-uuid", uuid).model(Item)
+            item = self._get(message("item {uuid}", uuid=uuid), "items", Word("by-uuid"), uuid).model(Item)
         except WebPageError:
             if self._speaks_silo():
                 return None
@@ -118,7 +119,7 @@ class ItemCalls(FileCalls):
         """
 
         def batch(some: Sequence[str]) -> dict[str, Item]:
-            where = (message("{count} items", count=len(some)), "items", "by-uuid")
+            where = (message("{count} items", count=len(some)), "items", Word("by-uuid"))
             reply = self._ask(*where, uuids=list(some), cancelled=cancelled)
             if reply.is_null(*LISTS):
                 # Go's empty list, or no answer. As "not registered", it would make people register again.
@@ -176,13 +177,13 @@ class ItemCalls(FileCalls):
             try:
                 asked: Params = {"q": query, "limit": limit}
                 reply = self._get(
-                    message("items like {query}", query=repr(query)), "items", "search", params=asked
+                    message("items like {query}", query=repr(query)), "items", Word("search"), params=asked
                 )
                 return reply.models(Item, *LISTS)
             except NotFoundError:
                 pass  # A server without the fuzzy search may still filter its list.
         if query:
-            params["search"] = query
+            params[Word("search")] = query
         return self._get(message("its items"), "items", params=params).models(Item, *LISTS)
 
     def create_item(

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from silo.api.address import Word
 from silo.api.caller import Caller
 from silo.api.transport import ApiCall
 from silo.bom.message import message
@@ -23,16 +24,16 @@ class TableCalls(Caller):
             "items",
             part_number,
             "bom",
-            "import",
+            Word("import"),
         )
 
     def import_parts(self, data: bytes, /, **asked: str) -> dict[str, Any]:
         """Import a list of parts. RejectedError lists all problems; then nothing was changed."""
-        return self._import(data, asked, message("the items"), "items", "import")
+        return self._import(data, asked, message("the items"), "items", Word("import"))
 
     def import_prices(self, data: bytes, /, **asked: str) -> dict[str, Any]:
         """Import a price list. RejectedError lists all problems; then nothing was changed."""
-        return self._import(data, asked, message("the suppliers"), "suppliers", "import")
+        return self._import(data, asked, message("the suppliers"), "suppliers", Word("import"))
 
     def _import(
         self, data: bytes, asked: Mapping[str, str], subject: str, /, *segments: str

@@ -10,6 +10,7 @@ from silo.api.pause import Pause
 from silo.api.wire import MergeResult, ProductSummary, Revision
 from silo.bom.compare.merge import MergePlan
 from silo.bom.errors import SiloError
+from silo.bom.items.part_address import part_page
 from silo.bom.message import message
 from silo.bom_sync.resolved import Resolved
 from silo.bom_sync.steps import Status
@@ -72,7 +73,7 @@ class Sent:
     @property
     def page(self) -> str:
         """Return the address of the page for it on the server."""
-        return f"/items/{self.number}/bom" if self.number else f"/documents/{self.part_number}"
+        return part_page(self.number, "bom") if self.number else f"/documents/{self.part_number}"
 
 
 @dataclass

@@ -30,6 +30,7 @@ from silo.file_kind import MODEL, kind_by_name
 from silo.file_state import FileState, file_state
 from silo.locator import refusal
 from silo.outbox.recorded import arrived, uid_of
+from silo.platform.part_file_name import part_file_stem
 from silo.platform.spelling import folded, one_path
 from silo.platform.whole_files import replacing
 from silo.project_folder import FileRecord, Project, record_of
@@ -256,11 +257,12 @@ def _place_beside(one: Fetched, folder: Path, taken: Container[str]) -> Path | N
     name = (one.revision.file_name or "file").replace("/", "_").replace("\\", "_").strip(". ") or "file"
     if refusal(name) is not None:
         name = f"_{name}"
-    for free in (name, f"{one.part_number}-{name}"):
+    stem = part_file_stem(one.part_number or "file")
+    for free in (name, f"{stem}-{name}"):
         target = folder / free
         if one_path(str(target)) not in taken and kind_by_name(free) != MODEL:
             return target
-    target = folder / f"{one.part_number}-{name}.{one.revision.kind}"
+    target = folder / f"{stem}-{name}.{one.revision.kind}"
     return None if one_path(str(target)) in taken else target
 
 

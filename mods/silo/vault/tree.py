@@ -29,6 +29,7 @@ from silo.bom.message import message
 from silo.fcstd.linked import recorded_paths
 from silo.file_kind import is_model
 from silo.locator import refusal
+from silo.platform.part_file_name import part_file_stem
 from silo.platform.whole_files import scratch_folder
 from silo.vault.revisions import file_revisions
 
@@ -155,7 +156,9 @@ class _Fetch:
         self._at = top.created_at
         # The top lies where it lay in its project: a link that steps out of its folder and back leads to one
         # place.
-        place = _place_in_project(top.file_path or top.file_name or f"{item.part_number}.FCStd")
+        place = _place_in_project(
+            top.file_path or top.file_name or f"{part_file_stem(item.part_number)}.FCStd"
+        )
         left = [(place, holder, top)]
         while left:
             position, other_revision, revision = left.pop(0)

@@ -11,7 +11,6 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Annotated, Any
-from urllib.parse import quote
 
 import anyio.to_thread
 from fastapi import APIRouter, Depends, Path, Query
@@ -22,6 +21,7 @@ from starlette.responses import FileResponse, Response
 from silo.api import wire
 from silo.api.wire import FactSource, HeldItem, ItemTexts, LinkedFile
 from silo.bom.errors import NotFoundError, RejectedError
+from silo.bom.items.part_address import part_segment
 from silo.bom.numbers import whole_number
 from silo.file_kind import ATTACHMENT_KINDS, MODEL
 from silo_server.db.answers import KeptAnswer, KeyedRequest, earlier_answer, keep_answer
@@ -229,7 +229,7 @@ def archive_item(call: Editor, part_number: str, expected: ExpectedVersion) -> R
     with call.write() as tx:
         used, uses = where_used(tx, items.get_item(tx, part_number), limit=20)
         items.archive_item(tx, part_number, expected)
-    where = ",".join(quote(usage.parent.part_number, safe="") for usage in used)
+    where = ",".join(part_segment(usage.parent.part_number) for usage in used)
     return Response(status_code=204, headers={"X-Total-Count": str(uses), "X-Used-In": where})
 
 

@@ -8,9 +8,11 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from tempfile import SpooledTemporaryFile
 from typing import IO, Any, cast
+from urllib.parse import quote
 
 from starlette.responses import Response, StreamingResponse
 
+from silo.platform.part_file_name import part_file_stem
 from silo_server.db.transaction import Tx
 from silo_server.routes.call import Call
 from silo_server.services.product.export import Export, Row
@@ -24,6 +26,13 @@ XLSX = "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"
 def content_of(media_type: str) -> dict[int | str, dict[str, Any]]:
     """Return the documented answers of a route that sends a file."""
     return {200: {"content": {media_type: {}}, "description": "The file"}}
+
+
+def _attachment(name: str) -> str:
+    """Write the header of a download, with a plain name beside one that is not plain (RFC 6266)."""
+    plain = "".join(c if c.isascii() and (c.isalnum() or c in "-_.") else "_" for c in name)
+    full = "" if plain == name else f"; filename*=UTF-8''{quote(name, safe='')}"
+    return f'attachment; filename="{plain}"{full}'
 
 
 class _Spool(SpooledTemporaryFile[bytes]):
@@ -73,9 +82,8 @@ def file_of(
     except BaseException:
         out.close()
         raise
-    stem = "".join(c if c.isascii() and (c.isalnum() or c in "-_.") else "_" for c in made.root.part_number)
     headers = {
-        "Content-Disposition": f'attachment; filename="{stem}-{name}"',
+        "Content-Disposition": _attachment(f"{part_file_stem(made.root.part_number)}-{name}"),
         "Content-Length": str(out.seek(0, os.SEEK_END)),
     }
     out.seek(0)

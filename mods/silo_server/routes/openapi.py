@@ -15,7 +15,7 @@ from silo.bom.text import REFUSED_CHARACTERS
 from silo_server.schema import ITEM_TYPES, find_schema
 from silo_server.services.access.passwords import MAX_PASSWORD, MIN_PASSWORD
 from silo_server.services.access.users import USERNAME_FORM
-from silo_server.services.items import NUMBER_FORM, RESERVED
+from silo_server.services.items import NUMBER_FORM
 from silo_server.user_json import MAX_KEY, MAX_NUMBER
 
 Schema = dict[str, Any]
@@ -42,17 +42,10 @@ def part_number(*, or_empty: bool = False) -> Schema:
         "type": "string",
         "maxLength": 200,
         "pattern": f"^({_BLANK}*{NUMBER_FORM.pattern}{_BLANK}*){optional}$",
-        "not": {"pattern": f"^\\s*(\\.|\\.\\.|{'|'.join(map(_in_any_case, sorted(RESERVED)))})\\s*$"},
-        "description": "1 to 64 characters, none of / \\ ? # % and no control characters; unique in any case",
+        "description": "1 to 64 characters without tabs, line ends and other control characters; unique in "
+        "any case. In an address: quoted, with ~2F for /, ~7E for ~, ~2E for each dot of a number of dots "
+        "alone, and ~_ before a word of the API such as search; %2F is read too",
     }
-
-
-def _in_any_case(word: str) -> str:
-    """Make a pattern that matches ``word`` in upper and lower case; ſ counts as an s."""
-    same = {"s": "sSſ", "k": "kK\u212a"}
-    return "".join(
-        f"[{same.get(c, c + c.upper())}]" if c.isalpha() else "\\" + c if c == "." else c for c in word
-    )
 
 
 def refused(reason: str) -> Schema:

@@ -11,8 +11,11 @@ from fastapi import Depends, HTTPException, Query, Request
 from fastapi.routing import APIRoute
 from starlette.datastructures import FormData
 from starlette.responses import Response
+from starlette.routing import Match
+from starlette.types import Scope
 
 from silo.bom.errors import RejectedError
+from silo.bom.items.part_address import part_number_of
 from silo.bom.numbers import whole_number
 from silo.bounded_json import read_json
 from silo.budget import MIB, Budget, OverBudgetError
@@ -54,7 +57,17 @@ class _BoundedRequest(Request):
             raise HTTPException(error.status_hint, str(error)) from None
 
 
-class BoundedRoute(APIRoute):
+class NumberedRoute(APIRoute):
+    """A route whose part numbers stand in the address as :func:`part_segment` writes them."""
+
+    def matches(self, scope: Scope) -> tuple[Match, Scope]:
+        """Match a path, and read its parameters."""
+        match, found = super().matches(scope)
+        given: dict[str, str] = found.get("path_params", {})
+        return match, {**found, "path_params": {name: part_number_of(text) for name, text in given.items()}}
+
+
+class BoundedRoute(NumberedRoute):
     """A route of the API that reads the JSON of its requests within a budget."""
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:

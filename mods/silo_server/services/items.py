@@ -38,8 +38,6 @@ from silo_server.user_json import check_json, dumps, merge_patch
 from silo_server.values import Item
 
 LONGEST_UNIT = 32
-# Words that stand where a part number stands in a path.
-RESERVED = frozenset({"by-uuid", "search", "export.csv", "import", "new"})
 # Two numbers that look the same must be the same number: what has no picture is refused. These are the
 # blanks but the plain one, the bidirectional and zero-width characters (Cf, Zl, Zp), and others that readers
 # may ignore.
@@ -48,13 +46,13 @@ UNSEEN = (
     "\\u180b-\\u180f\\u2000-\\u200f\\u2028-\\u202f\\u205f-\\u206f\\u2800\\u3000\\u3164\\ufe00-\\ufe0f\\ufeff\\uffa0"
     "\\ufff9-\\ufffb\U0001bca0-\U0001bca3\U0001d173-\U0001d17a\U000e0000-\U000e0fff"
 )
-_INSIDE = rf"/\\?#%\t\n\r{REFUSED_CHARACTERS}{UNSEEN}"
+_INSIDE = rf"\t\n\r{REFUSED_CHARACTERS}{UNSEEN}"
 NUMBER_FORM = re.compile(rf"[^\s{_INSIDE}](?:[^{_INSIDE}]{{0,62}}[^\s{_INSIDE}])?")
 _UNSEEN = re.compile(f"[{UNSEEN}]")
 
 
 def check_number(number: str) -> str:
-    """Check and trim a part number; RejectedError if it cannot stand in a path or a cell."""
+    """Check and trim a part number; RejectedError if it cannot be seen whole, or stand in one line."""
     if problem := character_problem(number):
         raise RejectedError(f"part_number: {problem}")
     trimmed = number.strip()
@@ -64,9 +62,9 @@ def check_number(number: str) -> str:
             f"part_number: wanted characters that can be seen, got {', '.join(unseen)} in {number!a}; "
             "type the number by hand instead of pasting it"
         )
-    if not NUMBER_FORM.fullmatch(trimmed) or trimmed.casefold() in RESERVED or trimmed in (".", ".."):
+    if not NUMBER_FORM.fullmatch(trimmed):
         raise RejectedError(
-            f"part_number: wanted 1 to 64 characters without / \\ ? # % and line ends, got {number!r}"
+            f"part_number: wanted 1 to 64 characters in one line, without tabs, got {number[:80]!r}"
         )
     return trimmed
 

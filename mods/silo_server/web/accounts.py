@@ -34,7 +34,7 @@ from silo_server.routes.call import (
     find_actor,
     server_of,
 )
-from silo_server.routes.requests import FORM_TYPES, PageFrom, form_of
+from silo_server.routes.requests import FORM_TYPES, NumberedRoute, PageFrom, form_of
 from silo_server.routes.sessions import set_session_cookie
 from silo_server.routes.tokens import revoke
 from silo_server.routes.users import login_path
@@ -69,7 +69,7 @@ from silo_server.web.local_path import local_path
 from silo_server.web.render import LANGUAGE_COOKIE, LANGUAGES, _, page, page_for, part_of
 from silo_server.web.unsent_form import UnsentForm, read_signed, unsent_form
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(route_class=NumberedRoute, include_in_schema=False)
 
 
 class LoginNeededError(Exception):

@@ -23,7 +23,7 @@ from silo_server.errors import ArchivedPartsError
 from silo_server.events import log
 from silo_server.events.log import EventQuery, LoggedEvent
 from silo_server.routes.call import Call
-from silo_server.routes.requests import PageFrom
+from silo_server.routes.requests import NumberedRoute, PageFrom
 from silo_server.services import revisions
 from silo_server.services.bom import history
 from silo_server.services.bom.differences import compare
@@ -41,7 +41,7 @@ from silo_server.web.line_form import changes, sentences
 from silo_server.web.merge_page import bom_path
 from silo_server.web.render import N_, Address, ListPart, _, isolate, page, part_of, plural, segment, spoken
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(route_class=NumberedRoute, include_in_schema=False)
 
 MOST = 100
 

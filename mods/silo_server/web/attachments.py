@@ -6,13 +6,14 @@ from __future__ import annotations
 from fastapi import APIRouter
 from starlette.responses import Response
 
+from silo_server.routes.requests import NumberedRoute
 from silo_server.services import attachments
 from silo_server.services.items import normal_uuid
 from silo_server.web.accounts import Writer
 from silo_server.web.forms import Form, back, text
 from silo_server.web.render import N_, _, isolate, segment
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(route_class=NumberedRoute, include_in_schema=False)
 
 _KINDS = {
     "drawing": N_("Drawing"),

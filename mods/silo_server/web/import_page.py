@@ -27,6 +27,7 @@ from silo.tables.limits import HEADER_WITHIN, MOST_COLUMNS
 from silo.tables.sheet import Layout, first_lines, guess_layout
 from silo_server.errors import TooLargeError
 from silo_server.routes.call import Call
+from silo_server.routes.requests import NumberedRoute
 from silo_server.schema import find_schema
 from silo_server.services.bom import imports
 from silo_server.services.bom.import_plan import NOTHING, Allowed
@@ -38,7 +39,7 @@ from silo_server.web.line_form import changes
 from silo_server.web.merge_page import bom_path
 from silo_server.web.render import N_, _, isolate, page, plural
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(route_class=NumberedRoute, include_in_schema=False)
 
 DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
 MOST_BYTES = 8 * 1024 * 1024

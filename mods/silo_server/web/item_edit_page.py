@@ -26,6 +26,7 @@ from silo.file_kind import MODEL
 from silo_server.db.transaction import Tx
 from silo_server.routes.call import Call
 from silo_server.routes.items import numbered, store_file
+from silo_server.routes.requests import NumberedRoute
 from silo_server.schema import ITEM_TYPES, Category, find_schema, text_hints
 from silo_server.services import items as service
 from silo_server.services.bom.unit_change import change_item_and_lines
@@ -40,7 +41,7 @@ from silo_server.web.forms import Form, back, compared, problems_of, same_text, 
 from silo_server.web.render import N_, _, isolate, page, segment
 from silo_server.web.unsent_form import UnsentForm
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(route_class=NumberedRoute, include_in_schema=False)
 
 # The item's own fields; those of its properties are called ``p.NAME``, and ``o.N.name``, ``o.N.value``.
 TEXTS = ItemTexts.model_fields

@@ -25,6 +25,7 @@ from silo.bom.quantities import as_decimal
 from silo_server.db.transaction import Tx
 from silo_server.errors import TooLargeError
 from silo_server.routes.items import told_of
+from silo_server.routes.requests import NumberedRoute
 from silo_server.schema import ITEM_TYPES, find_schema
 from silo_server.services import documents, revisions
 from silo_server.services.attachments import attachments_of
@@ -408,7 +409,7 @@ def _flat_keys(shown: ShownStructure) -> Mapping[str, Callable[[FlatRow], Any]]:
     }
 
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(route_class=NumberedRoute, include_in_schema=False)
 
 MOST_USES = 200
 

@@ -28,6 +28,7 @@ from silo_server.db.transaction import Tx
 from silo_server.errors import DuplicateError, LinesChangedError
 from silo_server.events import log
 from silo_server.routes.call import Call
+from silo_server.routes.requests import NumberedRoute
 from silo_server.schema import text_hints
 from silo_server.services.bom import history, line_edit, review
 from silo_server.services.bom.assignees import assignee_of, editors
@@ -60,7 +61,7 @@ from silo_server.web.render import (
     sentence,
 )
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(route_class=NumberedRoute, include_in_schema=False)
 
 LATER_CHANGES = 5
 # So many open questions are shown; up to so many have a form each, more are decided by boxes.

@@ -20,6 +20,7 @@ from silo.tables.price_rows import PRICES, PriceRows
 from silo.tables.sheet import Layout
 from silo_server.routes.call import Call
 from silo_server.routes.orders import OrderedBody, asked_of, prices_of, record_all
+from silo_server.routes.requests import NumberedRoute
 from silo_server.services import items as item_service
 from silo_server.services import orders, releases, suppliers
 from silo_server.services.items import ItemChange, get_item
@@ -43,7 +44,7 @@ from silo_server.web.render import (
     segment,
 )
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(route_class=NumberedRoute, include_in_schema=False)
 
 EMPTY_ROWS = 3
 _NO_PROBLEM = Problem()

@@ -22,6 +22,7 @@ from silo.bom.errors import BusyError, ConflictError
 from silo.bom.quantities import exact_product, exact_sum
 from silo_server.db.transaction import Tx
 from silo_server.errors import TooLargeError
+from silo_server.routes.requests import NumberedRoute
 from silo_server.services import releases
 from silo_server.services.attachments import attachments_of
 from silo_server.services.items import get_item
@@ -52,7 +53,7 @@ from silo_server.web.item_page import (
 from silo_server.web.releases_page import STAMPS
 from silo_server.web.render import Address, Page, page, segment
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(route_class=NumberedRoute, include_in_schema=False)
 
 # Some 400 sheets of paper.
 MOST_PRINTED = 20_000

@@ -16,6 +16,7 @@ from silo_server.db.transaction import Tx
 from silo_server.errors import TooLargeError
 from silo_server.routes.call import Call
 from silo_server.routes.releases import frozen_now
+from silo_server.routes.requests import NumberedRoute
 from silo_server.services import releases
 from silo_server.services.access.users import get_user
 from silo_server.services.items import get_item
@@ -35,7 +36,7 @@ from silo_server.web.attachments import kind_words
 from silo_server.web.forms import Form, back, text
 from silo_server.web.render import N_, Address, _, page, page_of, segment
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(route_class=NumberedRoute, include_in_schema=False)
 
 # No reader pages through more rows of a frozen tree; an export has all of them.
 MOST_ROWS = 20_000

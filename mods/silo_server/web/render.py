@@ -28,7 +28,7 @@ from functools import lru_cache
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
-from urllib.parse import quote, unquote, urlencode
+from urllib.parse import unquote, urlencode
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from fastapi import Request
@@ -39,6 +39,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from starlette.responses import HTMLResponse, Response
 
 import silo
+from silo.bom.items.part_address import part_segment
 from silo.bom.numbers import whole_number
 from silo.bom.quantities import as_decimal, decimal_text, quantity_of
 from silo_server.actors import Actor, Role
@@ -402,8 +403,8 @@ def sentence(text: str) -> str:
 
 
 def segment(text: str) -> str:
-    """Quote a part number as one segment of a path."""
-    return quote(text, safe="")
+    """Write a part number, a label or a name as one segment of a path."""
+    return part_segment(text)
 
 
 class _Translated(Extension):

@@ -21,6 +21,7 @@ from silo.bom.errors import SiloError, VersionConflictError
 from silo.bom.numbers import whole_number
 from silo_server.db.transaction import Tx
 from silo_server.routes.call import Call
+from silo_server.routes.requests import NumberedRoute
 from silo_server.services import following
 from silo_server.services.bom import assignees, history
 from silo_server.services.bom.assignees import editors
@@ -37,7 +38,7 @@ from silo_server.web.forms import Form, back, back_to, text, texts
 from silo_server.web.line_form import DONE, decision_of
 from silo_server.web.render import N_, Address, _, arranged, isolate, page, page_of, plural, spoken
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(route_class=NumberedRoute, include_in_schema=False)
 
 # What may wait, and what the filter calls it.
 KINDS: Mapping[str, tuple[str, Callable[[Waiting], int]]] = {

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
-from urllib.parse import quote
 
 from silo.bom.compare.bom_diff import BomChange, BomDiff, QuantityChange
+from silo.bom.items.part_address import part_page
 from silo.bom.message import joined, message
 from silo.bom.quantities import plain
 
@@ -32,7 +32,7 @@ def summary(diff: BomDiff) -> str:
 
 def resolve_url(part_number: str) -> str:
     """Return the page where a reviewer decides about what a merge left open."""
-    return f"/items/{quote(part_number, safe='')}/bom"
+    return part_page(part_number, "bom")
 
 
 def answer_of(

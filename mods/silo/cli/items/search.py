@@ -11,6 +11,7 @@ from rich.text import Text
 
 from silo import caption, spoken
 from silo.bom.errors import Exit
+from silo.bom.items.part_address import part_page
 from silo.bom.message import message
 from silo.bom.quantities import plain as plain_quantity
 from silo.cli.connection import client_of, named_item
@@ -44,7 +45,7 @@ def run_show(args: argparse.Namespace) -> int:
     with client_of(args) as client:
         item = named_item(client, args.part_number)
         lines = client.get_bom(item.part_number)
-        page = client.web_url(f"/items/{item.part_number}")
+        page = client.web_url(part_page(item.part_number))
     head = {name: getattr(item, name) for name in ("part_number", "name", "item_type", "current_revision")}
     rows: list[dict[str, Any]] = [
         {

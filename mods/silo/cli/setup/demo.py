@@ -24,6 +24,7 @@ from silo.batch import source_document
 from silo.bom.consolidation import consolidation_findings
 from silo.bom.entry import Extraction
 from silo.bom.errors import Exit, InputError, ServerFaultError
+from silo.bom.items.part_address import part_page
 from silo.bom.message import message
 from silo.bom.view.folders import base_folder
 from silo.bom_sync.activity_text import activity_text
@@ -238,7 +239,7 @@ class Demo:
 
     def _finish(self) -> None:
         number = resolve(read_assembly(str(self.top)), self.client).assembly.part_number or ""
-        self.page = self.client.web_url(f"/items/{number}/bom")
+        self.page = self.client.web_url(part_page(number, "bom"))
         self.out.print()
         self.out.print(message("The page where a reviewer decides: {page}", page=self.page), markup=False)
 

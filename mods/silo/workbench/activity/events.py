@@ -9,6 +9,7 @@ from typing import Any
 
 from silo.api.sse import MERGE, RESET, ServerEvent
 from silo.api.wire import MergeEvent
+from silo.bom.items.part_address import part_page
 from silo.bom_sync.activity_text import headline
 from silo.workbench.activity.badges import badges
 from silo.workbench.activity.box import EntryBatch, EntryLine, PaneEntry, revision_key
@@ -38,7 +39,7 @@ def of_event(event: ServerEvent, page: Page, now: float | None = None) -> PaneEn
         when=when,
         who=_text(data, "user", "created_by"),
         lines=tuple(EntryLine(text) for text in (_text(data, "comment", "description", "name"),) if text),
-        actions=view_actions(f"/items/{number}", page),
+        actions=view_actions(part_page(number), page),
         icon="silo-commit" if event.type == "revision.created" else "silo-register",
         part_of={"revision.created": EntryBatch.REVISED, "item.created": EntryBatch.CREATED}.get(event.type),
     )
@@ -80,7 +81,7 @@ def of_merge(merge: MergeEvent, page: Page, when: float, event_id: str | None = 
         tone=Tone.WARNING if any(badge.tone is Tone.WARNING for badge in lines) else Tone.PLAIN,
         who=merge.user,
         badges=lines,
-        actions=view_actions(merge.resolve_url or f"/items/{merge.item}/bom", page),
+        actions=view_actions(merge.resolve_url or part_page(merge.item, "bom"), page),
         icon="silo-bom",
     )
 

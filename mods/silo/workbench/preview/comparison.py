@@ -14,6 +14,7 @@ from silo.bom.compare.bom_diff import BomDiff
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.findings import Finding
 from silo.bom.items.naming import display_name
+from silo.bom.items.part_address import part_page
 from silo.workbench.documents.snapshot import Snapshot
 from silo.workbench.session.worker import Control
 
@@ -105,7 +106,7 @@ def ask(snapshot: Snapshot, api: Any, control: Control) -> Preview:
     compared = [_compared(resolved, other) for resolved, other in zip(assemblies(whole), lines, strict=True)]
     all_lines = [line for pair in compared for line in pair.lines]
     number = whole.assembly.part_number
-    page = api.web_url(f"/items/{number}/bom") if number else ""
+    page = api.web_url(part_page(number, "bom")) if number else ""
     return Preview(snapshot, tuple(compared), names_of(whole, all_lines), blocking(whole), page)
 
 

@@ -20,6 +20,7 @@ from silo.bom.errors import DocumentError, SiloError
 from silo.bom.message import message
 from silo.bom.system_refusals import why_refused
 from silo.outbox.store import KEPT_ASIDE_DAYS
+from silo.platform.part_file_name import part_file_stem
 from silo.platform.user_folders import cache_folder
 from silo.workbench.activity.box import own_box
 from silo.workbench.colleagues.theirs import Choice, Theirs
@@ -79,13 +80,8 @@ class RevisionFlow:
 
     def _open_beside(self, path: str, theirs: Theirs) -> None:
         if not theirs.revision:
-            target = _aside("on-disk", os.path.basename(path))
-            self._guarded(path, lambda: self._open_copy(path, target))
-            return
-        from silo.api.files import DocumentId
-
-        if isinstance(theirs.part_number, DocumentId):  # of no item: nothing says what it links to
-            target = _aside(f"{theirs.part_number}-r{theirs.revision}", os.path.basename(path))
+            stem = part_file_stem(theirs.part_number)
+            target = _aside(f"{stem}-r{theirs.revision}", os.path.basename(path))
             self._fetch(path, theirs, target, lambda: self._desk.open(str(target)))
             return
         folder = _aside(f"{_word(theirs.part_number)}-r{theirs.revision}")

@@ -2,12 +2,13 @@
 // The model on a page: shows the scene of an item in the viewer, and ties the rows of the page to it, both ways. With
 // another state to compare with, colours are what differs, and a person can go through the differences or the questions.
 
+import { partSegment } from "./part_address.js";
 import { root } from "./root.js";
 import { _, words as translations } from "./words.js";
 
 const place = document.getElementById("model");
 const { item, now, before, secret } = place.dataset;
-const address = `${root}/api/items/${encodeURIComponent(item)}`;
+const address = `${root}/api/items/${partSegment(item)}`;
 const stage = place.querySelector(".stage");
 const legend = place.querySelector(".legend");
 const PLAIN = "#c3c9d0";
@@ -261,7 +262,7 @@ async function portray({ without_picture: numbers, missing }) {
     if ((first.part_number !== number && missing.length) || list.some((one) => !one.body)) continue;
     const body = await viewer.picture(bodies(list), PIXELS);
     const headers = { "Content-Type": "image/png", "X-CSRF-Token": secret };
-    const answer = await fetch(`${root}/api/items/${encodeURIComponent(number)}/thumbnail`, { method: "PUT", headers, body });
+    const answer = await fetch(`${root}/api/items/${partSegment(number)}/thumbnail`, { method: "PUT", headers, body });
     if (!answer.ok && answer.status !== 409) return; // 409: somebody else was quicker
   }
 }
