@@ -22,8 +22,8 @@ from silo_server.db.turnstile import Turnstile
 from silo_server.events.hub import Hub
 from silo_server.housekeeping import last_run
 from silo_server.open_secrets import open_secrets
-from silo_server.schema import find_schema
 from silo_server.services.file_store import FileStore
+from silo_server.services.scheme import scheme_of
 
 
 def _free(files: FileStore, storage: Path) -> int | None:
@@ -51,6 +51,7 @@ def standing(db: Database, hub: Hub, files: FileStore, large_reads: Turnstile) -
         run, saved, tried = last_run(tx), get_state(tx, BACKED_UP), get_state(tx, RESTORE_TRIED)
         schema, mode = tx.conn.scalar(text("SELECT version_num FROM alembic_version")), mode_of(tx)
         size = tx.conn.scalar(text("SELECT pg_database_size(current_database())")) if tx.postgres else None
+        categories = len(scheme_of(tx).categories)
     path = db.settings.sqlite_path
     return state | {
         "version": importlib.metadata.version("silo-mod"),
@@ -69,7 +70,7 @@ def standing(db: Database, hub: Hub, files: FileStore, large_reads: Turnstile) -
             "event streams": hub.listeners,
             "summaries to be kept": len(db.built),
         },
-        "categories": len(find_schema(None).categories),
+        "categories": categories,
         "public_url": db.settings.public_url,
         "secure_cookies": db.settings.secure_cookies,
         "open_secrets": open_secrets(db.settings),

@@ -74,9 +74,9 @@ def test_numbers_are_unique_whatever_their_case(api: Api) -> None:
     assert error["error"] == "duplicate"
 
 
-def test_a_number_must_fit_into_a_path(api: Api) -> None:
-    """What cannot stand in a URL or a cell is no part number; blanks, dots and any letters may."""
-    for number in ("a/b", "", " ", "a\nb", "x" * 65, "by-uuid", "..", "a?b", "a%2fb"):
+def test_a_number_can_be_seen_and_stands_in_one_line(api: Api) -> None:
+    """What has no picture or several lines is no part number; blanks, dots, slashes and any letters may."""
+    for number in ("", " ", "a\nb", "a\tb", "x" * 65):
         api.bad(400, "POST", "/api/items", {"part_number": number, "name": "x"})
     number = api.item(f"Ä 12.5 +x {uuid.uuid4().hex[:6]}")
     assert api.get("/api/items/" + quote(number))["part_number"] == number

@@ -35,6 +35,16 @@ class TableCalls(Caller):
         """Import a price list. RejectedError lists all problems; then nothing was changed."""
         return self._import(data, asked, message("the suppliers"), "suppliers", Word("import"))
 
+    def import_categories(self, data: bytes, /, **asked: str) -> dict[str, Any]:
+        """Let a list of categories be the site's. RejectedError lists all problems."""
+        return self._import(data, asked, message("the categories"), "categories", Word("import"))
+
+    def undo_import(self, number: int, /) -> dict[str, Any]:
+        """Take an import back. ConflictError names what was changed since; then nothing was changed."""
+        where = self._address.api("imports", str(number), "undo")
+        call = ApiCall("POST", where, message("import {number}", number=number))
+        return dict(self._transport.send(call).mapping())
+
     def _import(
         self, data: bytes, asked: Mapping[str, str], subject: str, /, *segments: str
     ) -> dict[str, Any]:

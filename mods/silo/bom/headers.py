@@ -58,6 +58,8 @@ class Heading(StrEnum):
     CATEGORY = "category"
     ITEM_TYPE = "item_type"
     SOURCING = "sourcing_type"
+    ASSEMBLY = "is_assembly"
+    ATTACHMENTS = "attachments"
 
 
 # en, de, fr, es, it, ja, zh; Silo's and FreeCAD's own exports among them. The first alias fits best.
@@ -164,6 +166,8 @@ _ALIASES: dict[Heading, str] = {
     Heading.ITEM_TYPE: """item type; part type; artikeltyp; materialart; teileart""",
     Heading.SOURCING: """sourcing; sourcing type; procurement; make or buy; make buy; beschaffung;
         beschaffungsart; purchaseable; purchasable; bought""",
+    Heading.ATTACHMENTS: """attachments; attachment; attached files; anhänge; dateien""",
+    Heading.ASSEMBLY: """assembly; is assembly; baugruppe; ist baugruppe""",
 }
 
 _LONGEST = 500  # characters: what follows is no heading

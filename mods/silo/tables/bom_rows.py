@@ -27,7 +27,7 @@ from silo.tables.kind import TableKind
 from silo.tables.numerals import Numerals
 from silo.tables.sheet import Sheet
 from silo.tables.totals import is_total
-from silo.tables.yes_no import empty_means_fitted, is_fitted
+from silo.tables.yes_no import empty_means_fitted, is_fitted, read_yes_no
 from silo.workbook.sheet import SheetRow
 
 # What a line says; then what identifies a part without a number, or describes a new one.
@@ -58,6 +58,8 @@ BOM = TableKind(
     },
     single=LINE_ROLES,
 )
+# Roles whose cells are words of their own, never yes or no.
+_NAMES = (Heading.NAME, Heading.PART_NUMBER, Heading.DESCRIPTION)
 LINE_KINDS = ("component", "alternate", "reference")
 _RANGE = re.compile(r"([A-Za-z]{1,20})([0-9]{1,9})-([A-Za-z]{0,20})([0-9]{1,9})")
 # Columns of our own exports.
@@ -158,8 +160,12 @@ def bom_rows(sheet: Sheet, mark: Mark | None = None) -> BomRows:
 
 def refuse_clashes(sheet: Sheet, kind: TableKind) -> None:
     """Refuse two columns of one role that differ: a user says which one counts, not the order of the file."""
-    seconds = [(role, index) for role, index in sheet.columns.others if role in kind.single]
     cells = [row.cells for row in sheet.rows]
+    seconds = [
+        (role, index)
+        for role, index in sheet.columns.others
+        if role in kind.single and not (role in _NAMES and _answers_yes_or_no(cells, index))
+    ]
     problems = [
         message(
             "the columns '{ours}' and '{other}' both mean the {role}, and in row {line} they say "
@@ -178,6 +184,12 @@ def refuse_clashes(sheet: Sheet, kind: TableKind) -> None:
             message("file: {problems}; choose one, or rename the other", problems=joined("; ", problems)),
             problems,
         )
+
+
+def _answers_yes_or_no(rows: Sequence[Sequence[str]], index: int) -> bool:
+    """Return True if all cells of a column say yes or no: "Component" of an export is no name then."""
+    said = {cell_at(cells, index) for cells in rows} - {""}
+    return bool(said) and all(read_yes_no(text) is not None for text in said)
 
 
 def _no_line(row: SheetRow, at: Mapping[str, int], gap: int | None) -> str:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The rows of a list of parts: number, name, description, category, kind, sourcing, notes, makers and
-suppliers.
+"""The rows of a list of parts: number, name, description, category, kind, unit, sourcing, notes, link,
+makers and suppliers.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from silo.bom.headers import Heading
-from silo.bom.message import message
+from silo.bom.message import Message, message
 from silo.tables.bom_rows import refuse_clashes
 from silo.tables.columns import cell_at
 from silo.tables.kind import TableKind
@@ -26,6 +26,10 @@ ROLES = (
     Heading.ITEM_TYPE,
     Heading.SOURCING,
     Heading.NOTES,
+    Heading.UNIT,
+    Heading.ASSEMBLY,
+    Heading.LINK,
+    Heading.ATTACHMENTS,
     Heading.MATERIAL,
     *FACTS,
 )
@@ -83,8 +87,20 @@ def part_rows(sheet: Sheet) -> PartRows:
                 problems.append(
                     message("Sourcing: wanted purchased or manufactured, got {said}", said=repr(said[:40]))
                 )
+        if said := texts.pop(Heading.ASSEMBLY, ""):
+            problems += _assembly(said, texts)
         rows.append(PartRow(row.line, texts, tuple(problems)))
     return PartRows(tuple(rows), tuple(sheet.unused), sheet.notes)
+
+
+def _assembly(said: str, texts: dict[str, str]) -> list[Message]:
+    """Read the column that says if a part is an assembly; a type that the row names itself counts."""
+    answer = read_yes_no(said)
+    if answer is None:
+        return [message("Assembly: wanted yes or no, got {said}", said=repr(said[:40]))]
+    if answer and not texts.get(Heading.ITEM_TYPE):
+        texts[Heading.ITEM_TYPE] = "assembly"
+    return []
 
 
 def read_sourcing(text: str) -> str:

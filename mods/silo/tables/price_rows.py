@@ -4,13 +4,15 @@ on.
 
 A price of 100 pieces ("Price per 100", "Preiseinheit"), of a pack ("Price per pack") or of a unit is
 divided exactly. Prices stand in one column ("1: 0.12; 100: 0.10"), in several ("Price 1", "Price 100"), or
-in several rows with a "from quantity". What can be meant in two ways is a problem of the row: a single
-"Price 100", a currency in the cell and another in its column, a basis that is no number of pieces.
+in several rows with a "from quantity"; a plain "quantity" is that where a supplier part has several rows.
+What can be meant in two ways is a problem of the row: a single "Price 100", a currency in the cell and
+another in its column, a basis that is no number of pieces.
 """
 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from decimal import Decimal
@@ -22,7 +24,7 @@ from silo.bom.units import UnitKind, known_unit
 from silo.tables.bom_rows import refuse_clashes
 from silo.tables.columns import cell_at
 from silo.tables.heading_detail import PriceHeading, currency_of_word, days_of_heading
-from silo.tables.kind import TableKind
+from silo.tables.kind import TableKind, heading_role
 from silo.tables.numerals import Numerals
 from silo.tables.sheet import Sheet
 from silo.tables.totals import is_total
@@ -42,11 +44,20 @@ ROLES = (
     Heading.LEAD_TIME,
     Heading.PREFERRED,
 )
+
+
+def _role_of(cell: str) -> tuple[str, int] | None:
+    """Find the role of a heading; a plain quantity may be the one from which a price counts."""
+    found = heading_role(cell)
+    return (Heading.FROM_QUANTITY, 50 + found[1]) if found and found[0] == Heading.QUANTITY else found
+
+
 PRICES = TableKind(
     roles=ROLES,
     naming=(Heading.PART_NUMBER,),
     needed=(Heading.PART_NUMBER, Heading.SUPPLIER),
     single=tuple(role for role in ROLES if role is not Heading.PRICE),
+    role_of=_role_of,
 )
 _NUMBERS = (Heading.PACK_SIZE, Heading.MINIMUM, Heading.FROM_QUANTITY)
 _PER_WORD = re.compile(r"(?:per|pro|par|je|für|/)\s{0,3}", re.IGNORECASE)
@@ -89,6 +100,7 @@ def price_rows(sheet: Sheet, mark: Mark | None = None) -> PriceRows:
     prices = [(head, Numerals.of(sheet, index, mark), index) for index, head in sheet.columns.prices]
     bare = [head for head, _, _ in prices if head.bare]
     lone = bool(bare) and not sheet.columns.chosen and (len(prices) == 1 or all(h.least != 1 for h in bare))
+    scales = _scales(sheet)
     rows = []
     for row in sheet.rows:
         if is_total([cell_at(row.cells, at[Heading.PART_NUMBER])], row.cells):
@@ -99,6 +111,8 @@ def price_rows(sheet: Sheet, mark: Mark | None = None) -> PriceRows:
         for role in _NUMBERS:
             if texts.get(role):
                 _plain(role, numerals[role], row, texts, problems)
+        if scales is not None and scales[_supplier_part(sheet, row)] < 2 and texts.get(Heading.FROM_QUANTITY):
+            _one_quantity(sheet, texts, problems)
         _days(sheet, texts, problems)
         given: list[tuple[Decimal, Decimal]] = []
         for head, numeral, index in prices:
@@ -125,6 +139,37 @@ def price_rows(sheet: Sheet, mark: Mark | None = None) -> PriceRows:
             given += _prices(row, head, numeral, texts, numerals[Heading.PRICE_BASIS], problems)
         rows.append(PriceRow(row.line, texts, tuple(given), tuple(problems)))
     return PriceRows(tuple(rows), tuple(sheet.unused), sheet.notes)
+
+
+def _scales(sheet: Sheet) -> Counter[tuple[str, ...]] | None:
+    """Count the rows of each supplier part, if a plain quantity stands beside the prices; else None."""
+    index = sheet.columns.at.get(Heading.FROM_QUANTITY)
+    if index is None or sheet.columns.chosen:
+        return None
+    found = heading_role(sheet.header[index])
+    if found is None or found[0] != Heading.QUANTITY:
+        return None
+    return Counter(_supplier_part(sheet, row) for row in sheet.rows)
+
+
+def _supplier_part(sheet: Sheet, row: SheetRow) -> tuple[str, ...]:
+    roles = (Heading.PART_NUMBER, Heading.SUPPLIER, Heading.SUPPLIER_NUMBER)
+    return tuple(cell_at(row.cells, sheet.columns.at.get(role)).casefold() for role in roles)
+
+
+def _one_quantity(sheet: Sheet, texts: Mapping[str, str], problems: list[str]) -> None:
+    """Ask what a single quantity beside a price means, unless it is 1."""
+    quantity = parse_number(texts[Heading.FROM_QUANTITY])
+    if quantity is not None and quantity.exact != 1:
+        title = sheet.header[sheet.columns.at[Heading.FROM_QUANTITY]].strip()
+        problems.append(
+            message(
+                "Price: “{title}” {quantity} can be the quantity from which the price counts, or the number "
+                "of pieces that cost it; call the column “From quantity” or “Price per”",
+                title=title,
+                quantity=texts[Heading.FROM_QUANTITY],
+            )
+        )
 
 
 def _plain(role: str, numerals: Numerals, row: SheetRow, texts: dict[str, str], problems: list[str]) -> None:

@@ -61,7 +61,7 @@ class Grid:
     def put(self, row: int, column: int, cell: Cell) -> None:
         """Set a cell that is not empty. InputError if the sheet has more cells than a BOM can have."""
         if cell.text:
-            self.cells[row, column] = cell._replace(text=" ".join(cell.text.splitlines()))
+            self.cells[row, column] = cell._replace(text="\n".join(cell.text.splitlines()))
             if len(self.cells) > limits.MOST_CELLS:
                 raise InputError(
                     message(

@@ -925,6 +925,30 @@ def _device_logins(op: Operations) -> None:
     )
 
 
+def _imports(op: Operations) -> None:
+    """Remember what an import did, and how the columns of tables were assigned."""
+    op.create_table(
+        "imports",
+        primary("id", Id),
+        needed("at", Stamp),
+        needed("username", String(64)),
+        needed("kind", String(16)),
+        needed("file_name", Text),
+        needed("done", Text),
+        Column("undone_at", Stamp),
+        Column("undone_by", String(64)),
+        sqlite_autoincrement=True,
+    )
+    op.create_table(
+        "table_layouts",
+        primary("kind", String(16)),
+        primary("headings", String(64)),
+        needed("layout", Text),
+        needed("at", Stamp),
+        needed("username", String(64)),
+    )
+
+
 STEPS: dict[str, Callable[[Operations], None]] = {
     "0007": _first_schema,
     "0008": _answers,
@@ -946,4 +970,5 @@ STEPS: dict[str, Callable[[Operations], None]] = {
     "0025": _exact_quantities,
     "0026": _find_numbers,
     "0027": _device_logins,
+    "0028": _imports,
 }

@@ -444,6 +444,32 @@ orders = Table(
     sqlite_autoincrement=True,
 )
 
+# What an import of a table did (``done``, as JSON), to take it back as a whole.
+imports = Table(
+    "imports",
+    metadata,
+    primary("id", Id),
+    needed("at", Stamp),
+    needed("username", String(64)),
+    needed("kind", String(16)),
+    needed("file_name", Text),
+    needed("done", Text),
+    Column("undone_at", Stamp),
+    Column("undone_by", String(64)),
+    sqlite_autoincrement=True,
+)
+
+# How a user assigned the columns of a table (``layout``, as JSON), by the kind of table and its headings.
+table_layouts = Table(
+    "table_layouts",
+    metadata,
+    primary("kind", String(16)),
+    primary("headings", String(64)),
+    needed("layout", Text),
+    needed("at", Stamp),
+    needed("username", String(64)),
+)
+
 events = Table(
     "events",
     metadata,

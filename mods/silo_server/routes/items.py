@@ -49,7 +49,7 @@ from silo_server.routes.models import (
     UuidsBody,
 )
 from silo_server.routes.requests import BoundedRoute, ExpectedVersion, idempotency_key, json_body
-from silo_server.schema import describe, describe_form, find_schema, schemas
+from silo_server.schema import describe, describe_form
 from silo_server.services import attachments, documents, items, revisions, scene, search
 from silo_server.services.bom.last_sync import NEVER, LastSync, last_sync, last_syncs
 from silo_server.services.bom.unit_change import change_item_and_lines
@@ -69,6 +69,7 @@ from silo_server.services.file_store import StoredFile
 from silo_server.services.product.where_used import where_used
 from silo_server.services.releases import draft_of
 from silo_server.services.revisions import RevisionOrigin, revision_to_wire
+from silo_server.services.scheme import scheme_of
 from silo_server.values import Document, Item, Revision
 
 router = APIRouter(route_class=BoundedRoute, prefix="/api", tags=["items"], responses=READ_ERRORS)
@@ -250,20 +251,23 @@ def generate_part_number(call: Editor, body: NumberBody) -> Response:
 
 @router.get("/schemas")
 def list_schemas(call: Viewer) -> list[dict[str, Any]]:
-    """Return all part-number schemas."""
-    return [describe(schema) for schema in schemas().values()]
+    """Return the part-number schema: the site's own, or the one that comes with the server."""
+    with call.read() as tx:
+        return [describe(scheme_of(tx))]
 
 
 @router.get("/schemas/{name}")
 def get_schema(call: Viewer, name: str) -> dict[str, Any]:
     """Return a part-number schema: its segments with their values."""
-    return describe(find_schema(name))
+    with call.read() as tx:
+        return describe(scheme_of(tx, name))
 
 
 @router.get("/schemas/{name}/form")
 def get_schema_form(call: Viewer, name: str) -> dict[str, Any]:
     """Return the form descriptor for new items."""
-    return describe_form(find_schema(name))
+    with call.read() as tx:
+        return describe_form(scheme_of(tx, name))
 
 
 def item_to_wire(item: Item, last_sync: LastSync | None = None) -> dict[str, Any]:

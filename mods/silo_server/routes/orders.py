@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from decimal import Decimal
 from functools import partial
 from typing import Annotated, Any
@@ -16,7 +17,7 @@ from starlette.responses import Response
 from silo.bom.errors import RejectedError
 from silo.bom.numbers import LONGEST, read_number
 from silo.bom.quantities import as_decimal, decimal_text
-from silo.tables.price_rows import PriceRows
+from silo.tables.price_rows import PRICES, PriceRows
 from silo.tables.sheet import Layout
 from silo_server.db.transaction import Tx
 from silo_server.fields import to_wire
@@ -34,6 +35,7 @@ from silo_server.services.order_layouts import OrderLayout, export_for
 from silo_server.services.orders import NewOrder, OrderRequest, OrderRow, Recorded
 from silo_server.services.product.export import Export
 from silo_server.services.product.export_files import to_csv, to_xlsx
+from silo_server.services.table_layouts import remembered_layout
 
 router = APIRouter(
     route_class=BoundedRoute,
@@ -158,14 +160,25 @@ def _suppliers(parts: list[suppliers.SupplierPart], version: int) -> Response:
 
 
 @router.post("/suppliers/import", responses=WRITE_ERRORS, openapi_extra=IMPORT_BODY)
-async def import_suppliers(call: Editor, dry_run: Annotated[bool, Query()] = False) -> Response:
-    """Import supplier parts of many items from a CSV or a workbook; a wrong row refuses the whole file."""
-    data, _ = await uploaded(call.request)
+async def import_suppliers(
+    call: Editor,
+    dry_run: Annotated[bool, Query()] = False,
+    leave_out: Annotated[bool, Query()] = False,
+) -> Response:
+    """Import supplier parts of many items from a CSV or a workbook; a wrong row refuses the whole file.
+
+    ``leave_out``: items with problems are left out. ``import``, in the answer, can be undone.
+    """
+    data, name = await uploaded(call.request)
 
     def work() -> Response:
         read = prices_of(call, data)
+        done = None
         with call.read() if dry_run else call.write() as tx:
-            plan = (suppliers.plan_suppliers if dry_run else suppliers.apply_suppliers)(tx, read)
+            if dry_run:
+                plan = suppliers.plan_suppliers(tx, read, leave_out=leave_out)
+            else:
+                plan, done = suppliers.apply_suppliers(tx, read, leave_out=leave_out, file_name=name or "")
             rows = [
                 {
                     "part_number": item.part_number,
@@ -173,12 +186,14 @@ async def import_suppliers(call: Editor, dry_run: Annotated[bool, Query()] = Fal
                     "status": item.status,
                     "problems": list(item.problems),
                     "changes": list(item.words),
+                    **({"why": item.why} if item.why else {}),
                 }
                 for item in plan
             ]
             return json_answer(
                 {
                     "dry_run": dry_run,
+                    "import": done,
                     "unused_columns": list(read.unused),
                     "notes": list(read.notes),
                     "left_out": [{"row": row.line, "why": row.left_out} for row in read.rows if row.left_out],
@@ -190,8 +205,22 @@ async def import_suppliers(call: Editor, dry_run: Annotated[bool, Query()] = Fal
 
 
 def prices_of(call: Call, table: bytes, layout: Layout | None = None) -> PriceRows:
-    """Read a table of supplier parts."""
-    return suppliers.read_prices(table, call.server.settings.max_merge_entries, layout)
+    """Read a table of supplier parts; ``layout`` None: as a file with the same headings was read."""
+    known: tuple[str, ...] = ()
+    if layout is None:
+        with call.read() as tx:
+            layout, known = remembered_layout(tx, "prices", table, PRICES)
+    read = suppliers.read_prices(table, call.server.settings.max_merge_entries, layout)
+    return replace(read, notes=(*known, *read.notes))
+
+
+@router.get("/suppliers/export.csv", response_class=Response, responses=content_of("text/csv"))
+def export_suppliers(call: Viewer) -> Response:
+    """Return the supplier parts of all items as CSV, a row for each price. The import takes it back."""
+    with call.server.large_reads.enter(), call.read() as tx:
+        text = "".join(suppliers.export_suppliers(tx))
+    headers = {"Content-Disposition": 'attachment; filename="prices.csv"'}
+    return Response(text.encode(), media_type=CSV, headers=headers)
 
 
 def asked_of(

@@ -31,12 +31,24 @@ ITEM_TYPES = ("part", "assembly", "consumable", "tool")
 
 @dataclass(frozen=True, slots=True)
 class Category:
-    """A category of a schema: ``F01``, "Screws and bolts", and what its items are by default."""
+    """A category of a schema: ``F01``, "Screws and bolts", and what its items are by default.
+
+    prefix, digits
+        how its numbers are written: what stands before the serial, and the least digits of that.
+    parent
+        the code of the category above it; "" for none.
+    standard
+        the kinds of standard parts (screw, nut, …) that are of this category.
+    """
 
     code: str
     name: str
     item_type: str
     domain: str
+    prefix: str
+    digits: int
+    parent: str = ""
+    standard: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +111,7 @@ class PropertyField:
 
 @dataclass(frozen=True, slots=True)
 class Schema:
-    """A part-number schema: ``<category><separator><serial>``."""
+    """A part-number schema: the prefix of a category, and a serial that is counted for each category."""
 
     name: str
     version: int
@@ -112,14 +124,32 @@ class Schema:
 
     def number(self, category: str, serial: int) -> str:
         """Write ``F01-0001``. A serial with more digits makes it longer; gaps are allowed everywhere."""
-        return f"{category}{self.separator}{serial:0{self.serial_digits}d}"
+        of = self.categories[category]
+        return f"{of.prefix}{serial:0{of.digits}d}"
+
+    def path(self, code: str) -> str:
+        """Write a category with the names above it: ``Standard parts/Screws``."""
+        of = self.categories[code]
+        above = f"{self.path(of.parent)}/" if of.parent else ""
+        return f"{above}{of.name}"
+
+    def named(self, text: str) -> str:
+        """Find the code of a category that is named by code, name or path; "" for none, or for several."""
+        if text.strip().upper() in self.categories:
+            return text.strip().upper()
+        wanted = text.strip().casefold()
+        names = ((code, of.name, self.path(code)) for code, of in self.categories.items())
+        found = {code for code, *words in names if wanted in map(str.casefold, words)}
+        return found.pop() if wanted and len(found) == 1 else ""
 
     def category(self, code: str) -> Category:
         """Find a category by its code, in upper or lower case; RejectedError if there is none."""
         found = self.categories.get(code.strip().upper())
         if found is None:
             raise RejectedError(
-                f"category: wanted a category of schema {self.name} (such as A01, F01, M01), got {code!r}; "
+                f"category: wanted a category of schema {self.name} (such as "
+                f"{', '.join([*self.categories][:3]) if self.name != DEFAULT_SCHEMA else 'A01, F01, M01'}), "
+                f"got {code!r}; "
                 f"GET /api/schemas/{self.name} lists them"
             )
         return found
@@ -144,7 +174,14 @@ def find_schema(name: str | None) -> Schema:
 
 def _parse(raw: Mapping[str, Any]) -> Schema:
     categories = {
-        code: Category(code, entry["name"], entry["item_type"], code[0])
+        code: Category(
+            code,
+            entry["name"],
+            entry["item_type"],
+            code[0],
+            f"{code}{raw['separator']}",
+            raw["serial_digits"],
+        )
         for code, entry in raw["categories"].items()
     }
     return Schema(
@@ -178,6 +215,7 @@ def describe(schema: Schema) -> dict[str, Any]:
             {"name": "sequence", "type": "serial", "length": schema.serial_digits, "scope": "category"},
         ],
         "domains": dict(schema.domains),
+        "standard_parts": {kind: c.code for c in schema.categories.values() for kind in c.standard},
         **_described_rules(schema),
     }
 
@@ -214,6 +252,9 @@ def category_rules(schema: Schema, env: Mapping[str, str] = os.environ) -> list[
     if not isinstance(rules, list):
         raise ConfigError(f"{name}: wanted [[rules]] with words and a category, got rules = {rules!r}")
     wrong = []
+    if schema.name != DEFAULT_SCHEMA:  # rules about categories of another scheme say nothing of this one
+        texts = [rule.get("category") if isinstance(rule, dict) else None for rule in rules]
+        return [rule for rule, code in zip(rules, texts, strict=True) if code in schema.categories]
     for rule, where in zip(rules, _places(text, len(rules)), strict=True):
         try:
             schema.category(CategoryRule.read(rule).category)

@@ -31,8 +31,9 @@ from silo_server.db.transaction import Tx
 from silo_server.errors import DuplicateError
 from silo_server.events import announce
 from silo_server.fields import names_of
-from silo_server.schema import ITEM_TYPES, Category, Schema, find_schema
+from silo_server.schema import ITEM_TYPES, Category, Schema
 from silo_server.services import revisions
+from silo_server.services.scheme import scheme_of
 from silo_server.services.search import index_item, search_for
 from silo_server.user_json import check_json, dumps, merge_patch
 from silo_server.values import Item
@@ -71,7 +72,7 @@ def check_number(number: str) -> str:
 
 def preview_number(tx: Tx, schema_name: str | None, category: str) -> str:
     """Find the number that the next item of the category would get; the number stays free."""
-    schema = find_schema(schema_name)
+    schema = scheme_of(tx, schema_name)
     category_found = schema.category(category)
     last = tx.conn.scalar(
         select(number_counters.c.last_serial).where(
@@ -220,14 +221,11 @@ def get_by_uuids(tx: Tx, wanted: Sequence[str], *, include_archived: bool = Fals
     return [by_uuid[uuid] for uuid in dict.fromkeys(uuids_asked) if uuid in by_uuid]
 
 
-def get_by_numbers(tx: Tx, wanted: Sequence[str]) -> dict[str, Item]:
+def get_by_numbers(tx: Tx, wanted: Sequence[str], *, include_archived: bool = False) -> dict[str, Item]:
     """Find items by part number, in upper or lower case; the keys are the numbers as they were given."""
     keys = {number: number.casefold() for number in wanted}
-    rows = tx.conn.execute(
-        select(items).where(
-            one_of(tx, items.c.part_number_key, set(keys.values())), items.c.archived_at.is_(None)
-        )
-    ).all()
+    query = select(items).where(one_of(tx, items.c.part_number_key, set(keys.values())))
+    rows = tx.conn.execute(query if include_archived else query.where(items.c.archived_at.is_(None))).all()
     by_number = {row.part_number_key: to_item(row) for row in rows}
     return {number: by_number[key] for number, key in keys.items() if key in by_number}
 
@@ -272,7 +270,7 @@ def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
     UUID or key of another request.
     """
     # A repeat is judged like the first request: what is unusable is refused, whether or not the id is known.
-    schema = find_schema(new.schema)
+    schema = scheme_of(tx, new.schema)
     category = schema.category(new.category) if new.category else None
     item_type = _item_type(new.item_type, category)
     number = check_number(new.part_number) if new.part_number else None
@@ -354,7 +352,7 @@ def change_item(tx: Tx, part_number: str, change: ItemChange, expected: int | No
     """
     item = get_item(tx, part_number, lock=True)
     check_item_version(item, expected)
-    values = _changed_values(item, change)
+    values = _changed_values(tx, item, change)
     if "description" in values and "description" in item.origins:  # it was CAD's until now
         item = replace(item, origins={n: origin for n, origin in item.origins.items() if n != "description"})
         tx.conn.execute(update(items).where(items.c.id == item.id).values(origins=dumps(item.origins)))
@@ -533,7 +531,7 @@ def _stored_texts(texts: Mapping[str, str | None]) -> dict[str, str | None]:
     return {**texts, "unit": stored_unit(unit) or ""}
 
 
-def _changed_values(item: Item, change: ItemChange) -> dict[str, Any]:
+def _changed_values(tx: Tx, item: Item, change: ItemChange) -> dict[str, Any]:
     number = change.part_number
     if number not in (None, item.part_number):  # a number that is older than a rule may stay
         number = check_number(number)
@@ -542,7 +540,7 @@ def _changed_values(item: Item, change: ItemChange) -> dict[str, Any]:
         "name": change.name,
         "description": change.description,
         "item_type": _item_type(change.item_type, None) if change.item_type is not None else None,
-        "category": find_schema(item.schema).category(change.category).code if change.category else None,
+        "category": scheme_of(tx).category(change.category).code if change.category else None,
     }
     changed = {key: value for key, value in given.items() if value != getattr(item, key)}
     changed |= {key: value for key, value in _stored_texts(change.texts).items() if value != item.texts[key]}

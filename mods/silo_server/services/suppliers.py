@@ -10,11 +10,13 @@ Money and amounts are decimals, here and in what is stored; the one parser of th
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from decimal import ROUND_CEILING, Decimal
 from fractions import Fraction
 from math import ceil
@@ -23,7 +25,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import func, insert, select, update
 
 from silo.bom.errors import ConflictError, InputError, RejectedError, VersionConflictError
-from silo.bom.headers import Heading
+from silo.bom.headers import Heading, safe_cell
 from silo.bom.numbers import Mark, NumberReading, read_number, whole_number, yes_or_no
 from silo.bom.quantities import as_decimal, decimal_text, exact_product
 from silo.bom.text import character_problem
@@ -38,7 +40,8 @@ from silo_server.events import announce
 from silo_server.fields import from_row
 from silo_server.services import audit
 from silo_server.services.import_file import read_import
-from silo_server.services.items import get_by_numbers, get_item
+from silo_server.services.import_log import Done, log_import
+from silo_server.services.items import get_by_numbers, get_item, to_item
 from silo_server.services.product.parts import DEFAULT_CURRENCY, RolledItem, currency_of, positive_number
 from silo_server.services.search import index_item
 from silo_server.user_json import dumps
@@ -57,6 +60,8 @@ COLUMNS: Mapping[str, str] = {
     "lead_time_days": "Lead time [days]",
     "preferred": "Preferred",
 }
+# The columns of an export, in the place of that of the prices.
+_BREAK = ("From quantity", "Price")
 EXAMPLES = {"prices": "1: 0.50; 100: 0.40", "link": "https://…"}
 _RATES = "currency_rates"
 _CODE = re.compile("[A-Z]{3}")
@@ -458,7 +463,7 @@ def _write(tx: Tx, item: Item, made: Sequence[Mapping[str, Any]]) -> tuple[Item,
 
 @dataclass(frozen=True, slots=True)
 class ImportedItem:
-    """What an import makes of an item's list. ``status``: change, same or error."""
+    """What an import makes of an item's list. ``status``: change, same, skip (see ``why``) or error."""
 
     part_number: str
     rows: Sequence[int]
@@ -466,6 +471,7 @@ class ImportedItem:
     problems: Sequence[str] = ()
     parts: Sequence[SupplierPart] = ()
     words: Sequence[str] = field(default=())
+    why: str = ""
 
 
 def read_prices(data: bytes, max_rows: int, layout: Layout | None = None) -> PriceRows:
@@ -477,8 +483,8 @@ def read_prices(data: bytes, max_rows: int, layout: Layout | None = None) -> Pri
         raise RejectedError(str(error), list(error.problems)) from None
 
 
-def plan_suppliers(tx: Tx, read: PriceRows) -> list[ImportedItem]:
-    """Plan an import of rows, item by item; change nothing.
+def plan_suppliers(tx: Tx, read: PriceRows, *, leave_out: bool = False) -> list[ImportedItem]:
+    """Plan an import of rows, item by item; change nothing. ``leave_out``: items with problems are left out.
 
     A supplier part of the file replaces the same one of the item (by supplier and number), or is a new one;
     those that the file does not name stay. Several rows of one, each with a "from quantity", are its prices.
@@ -491,7 +497,13 @@ def plan_suppliers(tx: Tx, read: PriceRows) -> list[ImportedItem]:
     grouped: dict[str, list[PriceRow]] = {}
     for row in rows:
         grouped.setdefault(row.texts.get(Heading.PART_NUMBER, "").casefold(), []).append(row)
-    return [_planned(group, items_by_number, reader) for group in grouped.values()]
+    plan = [_planned(group, items_by_number, reader) for group in grouped.values()]
+    if not leave_out:
+        return plan
+    return [
+        replace(item, status="skip", problems=(), why="; ".join(item.problems)) if item.problems else item
+        for item in plan
+    ]
 
 
 def _cells_of(row: PriceRow) -> dict[str, str]:
@@ -558,13 +570,18 @@ def _planned(rows: Sequence[PriceRow], items_by_number: Mapping[str, Item], read
     )
 
 
-def apply_suppliers(tx: Tx, read: PriceRows) -> list[ImportedItem]:
-    """Import rows, all or nothing. RejectedError lists every problem; then nothing was changed."""
+def apply_suppliers(
+    tx: Tx, read: PriceRows, *, leave_out: bool = False, file_name: str = ""
+) -> tuple[list[ImportedItem], int | None]:
+    """Import rows, all or nothing. Returns what was done, and the number by which it can be undone.
+
+    RejectedError lists every problem; then nothing was changed.
+    """
     # Two imports of one item come one after the other, each on what the other wrote.
     keys = {row.texts.get(Heading.PART_NUMBER, "").casefold() for row in read.rows}
     query = select(items.c.id).where(one_of(tx, items.c.part_number_key, keys)).order_by(items.c.id)
     tx.conn.execute(query.with_for_update(key_share=True))
-    plan = plan_suppliers(tx, read)
+    plan, done = plan_suppliers(tx, read, leave_out=leave_out), Done()
     problems = [problem for item in plan for problem in item.problems]
     if problems:
         raise RejectedError(
@@ -572,8 +589,31 @@ def apply_suppliers(tx: Tx, read: PriceRows) -> list[ImportedItem]:
         )
     for item in plan:
         if item.status == "change":
-            set_supplier_parts(tx, item.part_number, item.parts)
-    return plan
+            of, change = set_supplier_parts(tx, item.part_number, item.parts)
+            done.suppliers.append((of.id, change))
+    return plan, log_import(tx, "prices", file_name, done)
+
+
+def export_suppliers(tx: Tx) -> Iterator[str]:
+    """Write the supplier parts of all items that are not archived as CSV, a row for each price.
+
+    The import takes the table back, and changes nothing.
+    """
+    out = io.StringIO()
+    writer = csv.writer(out)
+    writer.writerow(["Part number", *(title for name, title in COLUMNS.items() if name != "prices"), *_BREAK])
+    query = select(items).where(items.c.archived_at.is_(None)).order_by(items.c.part_number_key)
+    for row in tx.conn.execute(query):
+        item = to_item(row)
+        for part in supplier_parts_of(item):
+            cells = [text for name, text in texts_of(part).items() if name != "prices"]
+            for least, price in part.prices or ((None, None),):
+                ends = ("" if number is None else decimal_text(number) for number in (least, price))
+                writer.writerow(map(safe_cell, (item.part_number, *cells, *ends)))
+        yield out.getvalue()
+        out.seek(0)
+        out.truncate()
+    yield out.getvalue()
 
 
 def rates_of(tx: Tx) -> dict[str, Decimal]:

@@ -28,11 +28,13 @@ from silo.tables.sheet import Layout, first_lines, guess_layout
 from silo_server.errors import TooLargeError
 from silo_server.routes.call import Call
 from silo_server.routes.requests import NumberedRoute
-from silo_server.schema import find_schema
 from silo_server.services.bom import imports
 from silo_server.services.bom.import_plan import NOTHING, Allowed
 from silo_server.services.file_store import clean_name
+from silo_server.services.import_log import last_imports
 from silo_server.services.items import get_item
+from silo_server.services.scheme import scheme_of
+from silo_server.services.table_layouts import remember_layout, remembered_layout
 from silo_server.web.accounts import Writer
 from silo_server.web.forms import Form, back, text, whole
 from silo_server.web.line_form import changes
@@ -95,9 +97,10 @@ def apply(call: Writer, part_number: str, form: Form) -> Response:
     try:
         records = imports.read_bom(upload.data, call.server.settings.max_merge_entries, layout)
         with call.write() as tx:
-            plan, changes_made, _version = imports.apply_import(
+            plan, done, _version = imports.apply_import(
                 tx, part_number, records, upload.name, whole(form, "version"), allowed
             )
+            remember_layout(tx, "bom", upload.data, BOM, layout)
     except VersionConflictError:
         problem = Problem(
             _("The BOM was changed by somebody else since the file was checked; look again."), 412
@@ -114,13 +117,13 @@ def apply(call: Writer, part_number: str, form: Form) -> Response:
         changed=plan.count("change"),
         parts=plural(len(plan.new), "part"),
     )
-    return back(bom_path(part_number), notice, undo=changes_made)
+    return back(bom_path(part_number), notice, undo=[change for _item, change in done.boms])
 
 
 def _allowed(form: FormData) -> Allowed:
     return Allowed(
         text(form, "category", 32),
-        *(bool(text(form, name)) for name in ("add_up", "quantities", "remove")),
+        *(bool(text(form, name)) for name in ("add_up", "quantities", "remove", "leave_out")),
     )
 
 
@@ -161,6 +164,12 @@ def _show(
     problem: Problem = Problem(),
     allowed: Allowed = NOTHING,
 ) -> Response:
+    file = upload or problem.upload
+    layout = layout or problem.layout
+    known: tuple[str, ...] = ()
+    if file and layout is None:
+        with call.read() as tx:
+            layout, known = remembered_layout(tx, "bom", file.data, BOM)
     records = (
         imports.read_bom(upload.data, call.server.settings.max_merge_entries, layout)
         if upload
@@ -169,11 +178,12 @@ def _show(
     with call.read() as tx:
         item = get_item(tx, part_number)
         plan = imports.plan_import(tx, part_number, records, allowed) if upload else None
+        categories = scheme_of(tx).categories.values()
+        last = last_imports(tx, ("bom",))
     rows = plan.rows if plan else ()
     line_changes = {row.row: changes(row.before, row.after) for row in rows if row.before and row.after}
     # What is wrong, and what would change, is worth reading; rows that are as they were are not.
     order = {"error": 0, "add": 1, "change": 1, "skip": 2, "same": 2}
-    file = upload or problem.upload
     return page(
         call,
         "import.html",
@@ -182,12 +192,14 @@ def _show(
         upload=upload,
         plan=plan,
         allowed=allowed,
-        categories=find_schema(None).categories.values(),
+        categories=categories,
         rows=sorted(rows, key=lambda row: (order[row.status], row.row))[:MOST_ROWS],
         line_changes=line_changes,
         problem=problem.words,
         file=file,
-        reading=reading(file, layout or problem.layout) if file else None,
+        reading=reading(file, layout) if file else None,
+        known=known,
+        last=last,
     )
 
 

@@ -34,6 +34,7 @@ from silo_server.services.items import ItemChange, NewItem, get_item
 from silo_server.services.product.where_used import where_used
 from silo_server.services.releases import draft_of
 from silo_server.services.revisions import RevisionOrigin
+from silo_server.services.scheme import scheme_of
 from silo_server.values import Document, Item, Revision
 from silo_server.web.accounts import Writer
 from silo_server.web.attachments import kind_words
@@ -236,7 +237,7 @@ def unarchive(call: Writer, part_number: str, form: Form) -> Response:
 def texts_of(item: Item) -> dict[str, str]:
     """Write an item as the texts of its form."""
     shown = {name: str((item.texts[name] if name in TEXTS else getattr(item, name)) or "") for name in OWN}
-    names = {property_field.name for property_field in find_schema(item.schema).fields}
+    names = {property_field.name for property_field in find_schema(None).fields}
     for name, value in item.properties.items():
         if name in names and not (isinstance(value, str) and len(value) > LONGEST):
             shown[f"p.{name}"] = property_text(value)
@@ -256,7 +257,7 @@ def property_text(value: Any) -> str:
 
 def shown_properties(item: Item) -> list[tuple[str, str, str]]:
     """List (label, text, unit) of an item's texts and properties, those of the schema in its order."""
-    fields = {column.name: column for column in find_schema(item.schema).fields}
+    fields = {column.name: column for column in find_schema(None).fields}
     order = [name for name in fields if name in item.properties]
     order += sorted(name for name in item.properties if name not in fields)
     if item.supplier_parts:  # they have a page of their own, which counts
@@ -387,7 +388,8 @@ def _again(call: Call, part_number: str, shown: FormState) -> Response:
 
 
 def _page(call: Call, item: Item | None, shown: FormState, uses: int = 0) -> Response:
-    schema = find_schema(item.schema if item else None)
+    with call.read() as tx:
+        schema = scheme_of(tx)
     fields = [
         (property_field, shown.typed.get(f"p.{property_field.name}", "")) for property_field in schema.fields
     ]

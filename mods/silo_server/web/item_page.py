@@ -26,7 +26,7 @@ from silo_server.db.transaction import Tx
 from silo_server.errors import TooLargeError
 from silo_server.routes.items import told_of
 from silo_server.routes.requests import NumberedRoute
-from silo_server.schema import ITEM_TYPES, find_schema
+from silo_server.schema import ITEM_TYPES
 from silo_server.services import documents, revisions
 from silo_server.services.attachments import attachments_of
 from silo_server.services.bom.last_sync import in_sentences, last_sync
@@ -64,6 +64,7 @@ from silo_server.services.product.summary_read import (
 )
 from silo_server.services.product.where_used import use_counts, where_used
 from silo_server.services.product.worth import MassAndCost, in_unit_of
+from silo_server.services.scheme import scheme_of
 from silo_server.services.suppliers import rates_of
 from silo_server.values import Item, Line
 from silo_server.web.accounts import Reader
@@ -606,6 +607,7 @@ def items_page(
         items, total = list_items(tx, query)
         used = use_counts(tx, [item.id for item in items])
         marks = marks_of(tx, items)
+        categories = scheme_of(tx).categories
     asked = {"q": q, "type": type, "category": category, "archived": "1" if archived else "", "sort": sort}
     return page(
         call,
@@ -618,7 +620,7 @@ def items_page(
         type=type,
         types=ITEM_TYPES,
         category=category,
-        categories=find_schema(None).categories,
+        categories=categories,
         archived=archived,
         sort=sort,
     )

@@ -36,7 +36,7 @@ from silo_server.services.bom.decisions import Decision, resolve
 from silo_server.services.bom.last_sync import in_sentences, last_sync
 from silo_server.services.bom.line_state import mark_of
 from silo_server.services.bom.lines import LineId, component_of, line_of, lines_of
-from silo_server.services.bom.restore import undo_change
+from silo_server.services.import_undo import undo_bom_change
 from silo_server.services.items import get_item
 from silo_server.services.product.summary_read import summary_of
 from silo_server.services.revisions import files_until, has_file
@@ -176,13 +176,13 @@ def decide(call: Writer, part_number: str, form: Form) -> Response:
 
 @router.post("/items/{part_number}/bom/undo")
 def undo(call: Writer, part_number: str, form: Form) -> Response:
-    """Undo a change, as a new change."""
+    """Undo a change, as a new change; an import is taken back as a whole."""
 
     def work(tx: Tx) -> tuple[str, int]:
         change_id = whole(form, "change_id")
         if change_id is None:
             raise RejectedError(_("change_id: wanted the number of a change, got none; load the page again"))
-        return _("Undone."), undo_change(tx, part_number, change_id, None)[0]
+        return _("Undone."), undo_bom_change(tx, part_number, change_id)
 
     return _do(call, part_number, form, work)
 

@@ -23,9 +23,11 @@ from silo_server.routes.orders import OrderedBody, asked_of, prices_of, record_a
 from silo_server.routes.requests import NumberedRoute
 from silo_server.services import items as item_service
 from silo_server.services import orders, releases, suppliers
+from silo_server.services.import_log import last_imports
 from silo_server.services.items import ItemChange, get_item
 from silo_server.services.orders import OrderRequest, OrderRow
 from silo_server.services.suppliers import COLUMNS, EXAMPLES, MOST_PARTS
+from silo_server.services.table_layouts import remember_layout, remembered_layout
 from silo_server.web.accounts import Administrator, Reader, Writer
 from silo_server.web.attachments import kind_words
 from silo_server.web.forms import Form, amount, back, back_to, problems_of, text, texts, whole
@@ -261,18 +263,24 @@ def _prices(
     layout: Layout | None = None,
     problem: Problem = _NO_PROBLEM,
     typed: Sequence[tuple[str, str]] | None = None,
+    *,
+    leave_out: bool = False,
 ) -> Response:
     file = upload or problem.upload
     layout_read = layout or problem.layout
+    if file and layout_read is None:
+        with call.read() as tx:
+            layout_read = remembered_layout(tx, "prices", file.data, PRICES)[0]
     plan, read = None, PriceRows(())
     if upload:
         read = prices_of(call, upload.data, layout)
         with call.read() as tx:
-            plan = suppliers.plan_suppliers(tx, read)
-        order = {"error": 0, "change": 1, "same": 2}
+            plan = suppliers.plan_suppliers(tx, read, leave_out=leave_out)
+        order = {"error": 0, "skip": 1, "change": 2, "same": 3}
         plan.sort(key=lambda item: order[item.status])
     with call.read() as tx:
         own, *rates = suppliers.rates_of(tx).items()
+        last = last_imports(tx, ("prices",))
     return page(
         call,
         "prices.html",
@@ -288,6 +296,8 @@ def _prices(
         file=file,
         reading=reading(file, layout_read, PRICES) if file else None,
         action="/suppliers/check",
+        leave_out=leave_out,
+        last=last,
         own=own[0],
         rates=typed if typed is not None else [(code, number_text(rate)) for code, rate in rates],
     )
@@ -296,19 +306,21 @@ def _prices(
 @router.post("/suppliers/check")
 def check(call: Writer, form: Form) -> Response:
     """Show what a table would change; write nothing."""
-    return checked(form, PRICES, partial(_prices, call))
+    return checked(form, PRICES, partial(_prices, call, leave_out=bool(text(form, "leave_out"))))
 
 
 @router.post("/suppliers/import")
 def apply(call: Writer, form: Form) -> Response:
     """Import a table that was checked."""
     upload, layout = carried(form), layout_of(form, PRICES)
+    leave_out = bool(text(form, "leave_out"))
     try:
         read = prices_of(call, upload.data, layout)
         with call.write() as tx:
-            plan = suppliers.apply_suppliers(tx, read)
+            plan, _done = suppliers.apply_suppliers(tx, read, leave_out=leave_out, file_name=upload.name)
+            remember_layout(tx, "prices", upload.data, PRICES, layout)
     except SiloError as error:
-        return _prices(call, upload, layout, Problem.of(error))
+        return _prices(call, upload, layout, Problem.of(error), leave_out=leave_out)
     changed = sum(item.status == "change" for item in plan)
     return back(
         "/suppliers",

@@ -33,6 +33,7 @@ from silo_server.web import (
     item_page,
     merge_page,
     orders_page,
+    parts_page,
     print_page,
     releases_page,
     waiting_page,
@@ -53,7 +54,8 @@ from silo_server.web.render import (
 ROUTERS = (
     accounts.router,
     device_page.router,
-    item_edit_page.router,  # before item_page: /items/new is no part number
+    parts_page.router,  # before item_page: /items/import is no part number, nor is
+    item_edit_page.router,  # /items/new
     item_page.router,
     print_page.router,
     attachments.router,

@@ -40,6 +40,9 @@ _KIND_OF = {
     for number in numbers.split()
 }
 
+KINDS = (*_KINDS, "insert", "spacer", "standoff")
+"""The kinds of standard parts that have names."""
+
 OTHER_NAMES = {"screw": "bolt", "spacer": "standoff", "standoff": "spacer"}
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""``silo-mod import``: a BOM, a list of parts or a price list from a table into Silo."""
+"""``silo-mod import``: a BOM, a list of parts, prices or categories from a table into Silo, and back."""
 
 from __future__ import annotations
 
@@ -20,19 +20,34 @@ from silo.cli.json_output import print_json
 from silo.cli.options import add_options
 from silo.cli.terminal import console, plain, table_of
 
-KINDS = ("bom", "parts", "prices")
+KINDS = ("bom", "parts", "prices", "categories")
 # The parameters of the options, by the kind of table.
 _ASKED: Mapping[str, Mapping[str, str]] = {
-    "bom": {"make": "make", "add_up": "add_up", "quantities": "quantities", "remove": "remove"},
-    "parts": {"make": "category"},
-    "prices": {},
+    "bom": {
+        "make": "make",
+        "add_up": "add_up",
+        "quantities": "quantities",
+        "remove": "remove",
+        "leave_out": "leave_out",
+    },
+    "parts": {"make": "category", "duplicates": "duplicates", "leave_out": "leave_out"},
+    "prices": {"leave_out": "leave_out"},
+    "categories": {},
 }
 
 
 def add_import(parser: argparse.ArgumentParser) -> None:
     """Add the command."""
     parser.add_argument("kind", choices=KINDS, help="what the table is")
-    parser.add_argument("file", metavar="FILE", help="CSV, XLSX, ODS or XLS")
+    parser.add_argument("file", metavar="FILE", nargs="?", help="CSV, XLSX, ODS or XLS")
+    parser.add_argument(
+        "--duplicates",
+        choices=("first", "new"),
+        help="parts: of different rows with one number the first counts, or the others get new numbers",
+    )
+    parser.add_argument(
+        "--undo", type=int, metavar="IMPORT", help="take the import with this number back, as a whole"
+    )
     add_options(
         parser,
         {
@@ -44,19 +59,24 @@ def add_import(parser: argparse.ArgumentParser) -> None:
             "--add-up": message("bom: add up the rows of one part"),
             "--quantities": message("bom: the quantity counts where the designators name another number"),
             "--remove": message("bom: remove the lines that the file does not have"),
+            "--leave-out": message("leave out the rows with problems, by name"),
         },
     )
 
 
 def run_import(args: argparse.Namespace) -> int:
     """Import the file, or show what would happen. 1 if rows have problems, or if something was left out."""
+    if args.undo is not None:
+        return _undo(args)
+    if args.file is None:
+        raise InputError(message("name the file that is to be imported"))
     if (args.product is None) is (args.kind == "bom"):
         raise InputError(
             message("--product names the assembly of a BOM: give it with bom, and with bom alone")
         )
     asked = {"dry_run": "true"} if args.check else {}
     names = _ASKED[args.kind]
-    for option in _ASKED["bom"]:
+    for option in (*_ASKED["bom"], "duplicates"):
         value = getattr(args, option)
         if value and option not in names:
             raise InputError(
@@ -76,12 +96,24 @@ def run_import(args: argparse.Namespace) -> int:
         if args.kind == "bom":
             answer = client.import_bom(named_item(client, args.product).part_number, data, **asked)
         else:
-            answer = (client.import_parts if args.kind == "parts" else client.import_prices)(data, **asked)
+            answer = getattr(client, f"import_{args.kind}")(data, **asked)
     if args.json:
         print_json(answer)
     else:
         _print(args, answer)
     return Exit.UNDONE if _is_incomplete(answer) else Exit.DONE
+
+
+def _undo(args: argparse.Namespace) -> int:
+    """Take an import back."""
+    with client_of(args) as client:
+        answer = client.undo_import(args.undo)
+    if args.json:
+        print_json({**answer, "dry_run": False})
+    else:
+        words = message("Import {number} is undone: {file}", number=args.undo, file=plain(answer["file"]))
+        console().print(Text(spoken(words)))
+    return Exit.DONE
 
 
 def _is_incomplete(answer: Mapping[str, Any]) -> bool:
@@ -126,6 +158,9 @@ def _print(args: argparse.Namespace, answer: Mapping[str, Any]) -> None:
             )
         )
     )
+    if answer.get("import"):
+        undo = f"silo-mod import {args.kind} --undo {answer['import']}"
+        out.print(Text(spoken(message("Take it back with: {command}", command=undo))))
     missing = answer.get("missing", ())
     if missing and not answer.get("removed"):
         names = ", ".join(line["part_number"] for line in missing)

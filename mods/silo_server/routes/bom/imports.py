@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from typing import Annotated, Any
 
 import anyio.to_thread
@@ -12,6 +13,7 @@ from starlette.datastructures import UploadFile
 from starlette.responses import Response
 
 from silo.bom.errors import RejectedError
+from silo.tables.bom_rows import BOM
 from silo_server.db.answers import KeptAnswer, KeyedRequest, earlier_answer, keep_answer
 from silo_server.routes import openapi
 from silo_server.routes.answers import WRITE_ERRORS, etag_of, json_answer, raw_json
@@ -24,6 +26,7 @@ from silo_server.services.bom import imports
 from silo_server.services.bom.change import locked_parent
 from silo_server.services.bom.import_plan import Allowed, ImportPlan
 from silo_server.services.file_store import clean_name
+from silo_server.services.table_layouts import remembered_layout
 from silo_server.user_json import dumps
 
 router = bom_router("bom transfer")
@@ -60,20 +63,25 @@ async def import_csv(
     add_up: Annotated[bool, Query()] = False,
     quantities: Annotated[bool, Query()] = False,
     remove: Annotated[bool, Query()] = False,
+    leave_out: Annotated[bool, Query()] = False,
 ) -> Response:
     """Import a CSV or a workbook: XLSX, ODS, XLS (as the body, or as the form part ``file``).
 
     ``dry_run`` says row by row what would happen. Without it everything is imported or, if a row is wrong,
     nothing (400 with all problems). ``make``: unknown parts are made in this category; ``add_up``: rows of
     one part are added up; ``quantities``: the quantity counts where the designators name another number;
-    ``remove``: lines that the file does not have are removed. A file with levels changes the BOMs of its
+    ``remove``: lines that the file does not have are removed; ``leave_out``: rows with problems are left out.
+    ``import``, in the answer, can be undone. A file with levels changes the BOMs of its
     sub-assemblies too. A repeat with the same ``Idempotency-Key`` gets the first answer.
     """
     data, name = await uploaded(call.request)
-    allowed = Allowed(make, add_up, quantities, remove)
+    allowed = Allowed(make, add_up, quantities, remove, leave_out)
 
     def work() -> Response:
-        records = imports.read_bom(data, call.server.settings.max_merge_entries)
+        with call.read() as tx:
+            layout, known = remembered_layout(tx, "bom", data, BOM)
+        records = imports.read_bom(data, call.server.settings.max_merge_entries, layout)
+        records = replace(records, notes=(*known, *records.notes))
         if dry_run:
             with call.read() as tx:
                 return json_answer(
@@ -87,22 +95,32 @@ async def import_csv(
                 idempotency_key(call.request),
                 digest,
                 name,
-                *filter(None, (make, add_up, quantities and "quantities", remove and "remove")),
+                *filter(
+                    None,
+                    (
+                        make,
+                        add_up,
+                        quantities and "quantities",
+                        remove and "remove",
+                        leave_out and "leave_out",
+                    ),
+                ),
             )
             answer = earlier_answer(tx, request)
             if answer is None:
-                plan, _, version = imports.apply_import(tx, part_number, records, name, expected, allowed)
-                answer = KeptAnswer(dumps(plan_to_wire(plan, dry_run)), version)
+                plan, done, version = imports.apply_import(tx, part_number, records, name, expected, allowed)
+                answer = KeptAnswer(dumps(plan_to_wire(plan, dry_run, done.number)), version)
                 keep_answer(tx, request, answer)
             return raw_json(answer.text, headers={"ETag": etag_of(answer.version)})
 
     return await anyio.to_thread.run_sync(work)
 
 
-def plan_to_wire(plan: ImportPlan, dry_run: bool) -> dict[str, Any]:
+def plan_to_wire(plan: ImportPlan, dry_run: bool, done: int | None = None) -> dict[str, Any]:
     """Return the plan of an import as the API sends it."""
     return {
         "dry_run": dry_run,
+        "import": done,
         "counts": {status: plan.count(status) for status in ("add", "change", "same", "skip", "error")},
         "problems": plan.problems,
         "unused_columns": list(plan.unused),

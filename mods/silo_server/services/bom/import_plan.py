@@ -24,12 +24,15 @@ class Allowed:
         the quantity counts where the reference designators name another number of places.
     remove
         lines that the file does not have are removed.
+    leave_out
+        rows with problems are left out by name, with what stands below them.
     """
 
     category: str = ""
     add_up: bool = False
     quantities: bool = False
     remove: bool = False
+    leave_out: bool = False
 
 
 NOTHING = Allowed()

@@ -28,7 +28,6 @@ from silo.tables.sheet import Layout
 from silo_server.db.rows import one_of
 from silo_server.db.tables import items
 from silo_server.db.transaction import Tx
-from silo_server.schema import find_schema
 from silo_server.services.bom.change import (
     ChangeNote,
     apply_changes,
@@ -43,7 +42,9 @@ from silo_server.services.bom.line_edit import check_state, edited_state, means_
 from silo_server.services.bom.line_record import ChangeKind, LineRecord
 from silo_server.services.bom.lines import lines_of_many
 from silo_server.services.import_file import read_import
+from silo_server.services.import_log import Done, log_import
 from silo_server.services.items import by_ids, create_item, get_item
+from silo_server.services.scheme import scheme_of
 from silo_server.values import Item, Line, LineState
 
 _LEFT_OUT_ABOVE = "stands below a row that is left out"
@@ -85,7 +86,7 @@ def plan_import(tx: Tx, part_number: str, read: BomRows, allowed: Allowed = NOTH
     """Plan an import of the rows of :func:`read_bom`, row by row; change nothing."""
     product = get_item(tx, part_number)
     if allowed.category:
-        find_schema(None).category(allowed.category)
+        scheme_of(tx).category(allowed.category)
     file = _file_of(tx, product, read)
     added = _add_up(file) if allowed.add_up else {}
     rings = _rings(tx, file)
@@ -112,6 +113,8 @@ def plan_import(tx: Tx, part_number: str, read: BomRows, allowed: Allowed = NOTH
             ring = in_file.get(index) or rings.get((file.assembly_key(index), row.child_id or 0))
             if ring and row.status in ("add", "error"):
                 row = replace(row, status="error", problems=(ring,), could="", before=None, after=None)
+        if row.problems and allowed.leave_out:
+            row = replace(row, status="skip", problems=(), could="", new=None, why="; ".join(row.problems))
         if row.new is not None:
             made.add(part.key)
         rows.append(row)
@@ -369,11 +372,11 @@ def apply_import(
     file_name: str | None,
     expected: int | None,
     allowed: Allowed = NOTHING,
-) -> tuple[ImportPlan, list[int], int]:
+) -> tuple[ImportPlan, Done, int]:
     """Import the rows of :func:`read_bom`, all BOMs in one transaction.
 
-    Returns (what was done, the change of each BOM, the version of the product's BOM). RejectedError lists
-    every problem, and then nothing was changed.
+    Returns (the plan, what was done of it, the version of the product's BOM).
+    RejectedError lists every problem, and then nothing was changed.
     """
     product = locked_parent(tx, part_number)
     check_version(product, expected)
@@ -417,15 +420,16 @@ def apply_import(
             LineRecord(line.id, line.child_id, line.state, None, line.position)
         )
     records.setdefault(product.part_number, [])
-    changes, version = [], product.bom_version
+    done, version = Done(made=[item.id for item in made.values()]), product.bom_version
     for parent, own in records.items():
         assembly = product if parent == product.part_number else get_item(tx, parent, lock=True)
         check_no_cycle(tx, assembly, [record.child_id for record in own if record.before is None])
         change, after = apply_changes(tx, assembly, own, _note(own, file_name))
-        changes.append(change)
+        done.boms += [(assembly.id, change)] if change else []
         if assembly.id == product.id:
             version = after
-    return plan, changes, version
+    log_import(tx, "bom", file_name or "", done)
+    return plan, done, version
 
 
 def _note(records: Sequence[LineRecord], file_name: str | None) -> ChangeNote:
