@@ -145,6 +145,35 @@ BOMS = {
     ),
     "their number alone": Bom("SKU,Qty\nA,1\n", refused="no column 'Part number'"),
     "our number and theirs": Bom("IPN,Supplier,SKU,Qty\nA,W,77,1\n", A),
+    "french": Bom("Repère;Référence;Désignation;Quantité\n1;A;a;1\n2;B;b;2\n", AB),
+    "spanish": Bom("Número de pieza;Denominación;Cantidad\nA;a;1\nB;b;2\n", AB),
+    "italian": Bom("Codice articolo;Denominazione;Quantità\nA;a;1\nB;b;2\n", AB),
+    "japanese": Bom("部品番号,品名,数量\nA,a,1\nB,b,2\n", AB),
+    "chinese": Bom("零件号,名称,数量\nA,a,1\nB,b,2\n", AB),
+    "french positions": Bom("Repère;Référence;Quantité\n1;A;1\n1.1;B;2\n2;C;3\n", TREE),
+    "german with a sum of the masses": Bom(
+        "Pos;Teilenummer;Menge;Gewicht\n1;A;1;2,5\n2;B;2;1,5\n;Gesamtgewicht;;5,5\n",
+        AB,
+        out=["Gesamtgewicht"],
+        unused=["Gewicht"],
+    ),
+    "a subtotal in the middle": Bom("PN,Qty\nA,1\nZwischensumme,1\nB,2\n", AB, out=["Zwischensumme"]),
+    "do not populate": Bom("PN,Qty,Do Not Populate\nA,1,\nB,2,x\n", AB[:1], out=["B"]),
+    "DNF with 1 and 0": Bom("PN,Qty,DNF\nA,1,0\nB,2,1\n", A, out=["B"]),
+    "fitted, in Italian": Bom("PN;Qtà;Montato\nA;1;sì\nB;2;no\n", A, out=["B"]),
+    "the word NP": Bom("PN,Qty,DNP\nA,1,\nB,2,NP\n", A, out=["B"]),
+    "a space as the sign of thousands": Bom("PN;Qty\nA;1 250,5\n", [("A", "1250.5", "")]),
+    "an apostrophe as the sign of thousands": Bom("PN;Qty\nA;1'250.5\n", [("A", "1250.5", "")]),
+    "points and a comma": Bom("PN;Qty\nA;1.250,5\n", [("A", "1250.5", "")]),
+    "commas and a point": Bom('PN,Qty\nA,"1,250.5"\n', [("A", "1250.5", "")]),
+    "no quantity": Bom("PN,Qty\nA,1\nB,\n", [("A", "1", ""), ("B", None, "")], asks=["Quantity"]),
+    "a negative quantity": Bom("PN,Qty\nA,-1\n", [("A", None, "")], asks=["above 0"]),
+    "a quantity in words": Bom("PN,Qty\nA,two\n", [("A", None, "")], asks=["Quantity"]),
+    "quotes within quotes": Bom('PN,Name,Qty\nA,"½"" hose",1\n', A),
+    "a line break in a name": Bom('PN,Name,Qty\nA,"a\nb",1\nB,b,2\n', AB),
+    "a column that says yes or no beside the name": Bom(
+        "PN,Name,Component,Qty\nA,a,True,1\nB,b,False,2\n", AB, unused=["Component"]
+    ),
 }
 
 PRICE_LISTS = {
@@ -208,6 +237,24 @@ PRICE_LISTS = {
         "PN,Supplier,Price (old)\nA,W,1\n", [("A", "", "1: 1", "")], asks=["unknown word “old”"]
     ),
     "a sum": Prices("PN,Supplier,Price\nA,W,1\nTotal,,1\n", [("A", "", "1: 1", "")]),
+    "a part that is called =SUM": Prices("PN,Supplier,Price\n=SUM,W,1\n", [("=SUM", "", "1: 1", "")]),
+    "a row for each quantity": Prices(
+        "IPN,Supplier,SKU,Quantity,Price\nA,W,7,1,3\nA,W,7,10,2\n",
+        [("A", "7", "1: 3", ""), ("A", "7", "10: 2", "")],
+    ),
+    "one quantity beside a price": Prices(
+        "IPN,Supplier,Quantity,Price\nA,W,100,3\n",
+        [("A", "", "100: 3", "")],
+        asks=["from which the price counts"],
+    ),
+    "one piece beside a price": Prices("IPN,Supplier,Quantity,Price\nA,W,1,3\n", [("A", "", "1: 3", "")]),
+    "a price of a thousand": Prices("PN;Lieferant;Preis/1000 Stk\nA;W;12,00\n", [("A", "", "1: 0.012", "")]),
+    "a dozen in words": Prices(
+        "PN,Supplier,Price,Price basis\nA,W,12,dozen\n", [("A", "", "1: 12", "")], asks=["Price basis"]
+    ),
+    "french prices": Prices("Référence;Fournisseur;Prix\nA;W;1,50 €\n", [("A", "", "1: 1.5", "EUR")]),
+    "a currency column": Prices("PN;Lieferant;Preis;Währung\nA;W;1,50;chf\n", [("A", "", "1: 1.5", "CHF")]),
+    "a sum with a supplier": Prices("PN,Supplier,Price\nA,W,1\nSumme,,1\n", [("A", "", "1: 1", "")]),
 }
 
 

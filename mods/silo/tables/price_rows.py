@@ -59,6 +59,7 @@ PRICES = TableKind(
     single=tuple(role for role in ROLES if role is not Heading.PRICE),
     role_of=_role_of,
 )
+_NAMING = (Heading.PART_NUMBER, Heading.SUPPLIER, Heading.SUPPLIER_NUMBER)
 _NUMBERS = (Heading.PACK_SIZE, Heading.MINIMUM, Heading.FROM_QUANTITY)
 _PER_WORD = re.compile(r"(?:per|pro|par|je|für|/)\s{0,3}", re.IGNORECASE)
 
@@ -103,7 +104,7 @@ def price_rows(sheet: Sheet, mark: Mark | None = None) -> PriceRows:
     scales = _scales(sheet)
     rows = []
     for row in sheet.rows:
-        if is_total([cell_at(row.cells, at[Heading.PART_NUMBER])], row.cells):
+        if is_total([cell_at(row.cells, at.get(role)) for role in _NAMING], row.cells):
             rows.append(PriceRow(row.line, {}, left_out=message("a sum, no part")))
             continue
         problems: list[str] = []
@@ -153,8 +154,7 @@ def _scales(sheet: Sheet) -> Counter[tuple[str, ...]] | None:
 
 
 def _supplier_part(sheet: Sheet, row: SheetRow) -> tuple[str, ...]:
-    roles = (Heading.PART_NUMBER, Heading.SUPPLIER, Heading.SUPPLIER_NUMBER)
-    return tuple(cell_at(row.cells, sheet.columns.at.get(role)).casefold() for role in roles)
+    return tuple(cell_at(row.cells, sheet.columns.at.get(role)).casefold() for role in _NAMING)
 
 
 def _one_quantity(sheet: Sheet, texts: Mapping[str, str], problems: list[str]) -> None:
@@ -210,7 +210,7 @@ def _prices(
     for written in filter(None, map(str.strip, re.split("[;\n]", text))):
         least_text, colon, price_text = written.rpartition(":")
         price = numeral.read_text(price_text, is_number=is_number)
-        least = head.least or (from_row.exact if from_row else Decimal(1))
+        least = head.least or (from_row.exact.normalize() if from_row else Decimal(1))
         if colon:
             quantity = numeral.read_text(least_text)
             if quantity.value is None:
