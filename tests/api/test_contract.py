@@ -110,6 +110,7 @@ def test_the_fake_has_the_methods_of_the_client_with_the_same_arguments() -> Non
     # The fake has no connection, no administrators, no pages, no orders, no pictures and no models, and
     # reads no tables.
     own = {
+        "asked_again",
         "begin_login",
         "close",
         "events",
@@ -119,11 +120,13 @@ def test_the_fake_has_the_methods_of_the_client_with_the_same_arguments() -> Non
         "get_order_table",
         "get_scene",
         "import_bom",
+        "import_categories",
         "import_parts",
         "import_prices",
         "modules",
         "system",
         "thumbnail",
+        "undo_import",
     }
     assert set(client) - set(fake) == own
     assert set(fake) - set(client) == {"set_mode"}

@@ -78,7 +78,7 @@ def test_tables_and_findings_are_german(german: None, run: Any, gearbox: Path) -
     assert re.search(r"✗ Die Datei \S*Cover.FCStd fehlt; verwendet von Cover", ran.out)
     assert "missing" not in ran.out
     rows = run("bom", gearbox, "--csv", "-").out.splitlines()
-    assert rows[0] == "level,part number,name,quantity,unit,standard,file,object,missing"
+    assert rows[0] == "level,part number,name,values,quantity,unit,standard,file,object,missing"
     found = run("bom", gearbox, "--json").json()["findings"]
     assert any("is missing; used by" in finding["message"] for finding in found)
 

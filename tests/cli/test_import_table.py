@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -48,3 +49,20 @@ def test_options_of_another_kind_are_refused(run: Any, files: dict[str, Path]) -
     for words in (("bom",), ("parts", "--product", "A"), ("parts", "--remove"), ("prices", "--make", "F01")):
         kind, *rest = words
         assert run("import", kind, files[kind], *rest).code == Exit.BAD_INPUT
+
+
+def test_an_import_is_taken_back_and_categories_come_in(
+    run: Any, files: dict[str, Path], tmp_path: Path
+) -> None:
+    """The command that the import names works; its JSON and that of categories have the published shape."""
+    number = run("import", "parts", files["parts"], "--json").json()["import"]
+    undone = run("import", "parts", "--undo", str(number), "--json")
+    assert (undone.code, undone.json()["import"]) == (0, number)
+    done = run("import", "parts", files["parts"])
+    command = re.search(r"silo-mod (import parts --undo \d+)", done.out)
+    assert command is not None
+    assert "is undone" in run(*command[1].split()).out
+    table = tmp_path / "categories.csv"
+    table.write_text("Code,Name\nZ01,Cables\n", "utf-8")
+    checked = run("import", "categories", table, "--check", "--json")
+    assert [row["status"] for row in checked.json()["rows"]] == ["add"]

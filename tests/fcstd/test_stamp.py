@@ -243,7 +243,7 @@ def test_a_full_disk_leaves_the_file(tmp_path: Path) -> None:
         found = refused(path)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-    assert found == "it cannot be written: File too large"
+    assert found == "it cannot be written: the file is larger than the disk allows"
 
 
 @pytest.mark.usefixtures("needs_modes", "needs_symlinks")

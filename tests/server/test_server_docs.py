@@ -30,7 +30,7 @@ def test_every_route_is_named(text: str, tmp_path: Path) -> None:
 def test_every_setting_is_named(text: str) -> None:
     """And no setting that there is not."""
     named = set(re.findall(r"SILO_[A-Z_]+", text))
-    assert named == set(_ENVIRONMENT.values()) | {"SILO_API_TOKEN"}
+    assert named == set(_ENVIRONMENT.values()) | {"SILO_API_TOKEN", "SILO_PASSWORD_MEMORY"}
 
 
 def test_every_event_is_named(text: str) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urljoin
 
+from silo.api.address import Word
 from silo.api.caller import LISTS, Caller, Params, as_json
 from silo.api.multipart import FileBody, FileForm, Progress
 from silo.api.replies import error_of
@@ -154,7 +155,9 @@ class FileCalls(Caller):
         documents: dict[str, Document] = {}
         wanted = sorted({uuid.lower() for uuid in uuids if uuid})
         for at in range(0, len(wanted), _PAGE):
-            reply = self._ask(message("the files"), "documents", "by-uuid", uuids=wanted[at : at + _PAGE])
+            reply = self._ask(
+                message("the files"), "documents", Word("by-uuid"), uuids=wanted[at : at + _PAGE]
+            )
             documents |= {model.id: model for model in reply.models(Document, "documents", *LISTS)}
         return documents
 

@@ -103,10 +103,10 @@ def flat_table(rows: Sequence[Mapping[str, Any]]) -> Table:
     """Draw the flat BOM: a purchaser's table of totals."""
     table = table_of("Part number", "Name", "Quantity", "Unit", "Standard or file", "")
     for row in rows:
-        file = f"{row['doc_path']}#{row['object']}"
+        file, values = f"{row['doc_path']}#{row['object']}", row.get("variant", "")
         table.add_row(
             Text(plain(row["part_number"] or "–"), "cyan" if row["part_number"] else "dim"),
-            Text(plain(with_values(row["name"], row.get("variant", "")))),
+            Text(plain(with_values(row["name"], values))),
             str(row["quantity"]),
             row["unit"],
             Text(plain(row["standard"] or file)),

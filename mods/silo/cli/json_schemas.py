@@ -425,10 +425,15 @@ Imported = _shape(
     unused_columns=_many(str),
     notes=_many(str),
     missing=(_many(dict[str, str]), []),
-    removed=(int, 0),
+    removed=(_described(int | _many(str), "lines of a BOM, or the codes of categories"), 0),
+    kept=(_described(_many(str), "categories that items are of"), []),
     left_out=(_many(dict[str, Any]), []),
     rows=(_many(dict[str, Any]), []),
     items=(_many(dict[str, Any]), []),
+    import_=(_described(int | None, "its number, for --undo"), None),
+)
+Undone = _shape(
+    "Undone", doc="Of ``import --undo``.", kind=str, file=str, import_=_described(int, "its number")
 )
 
 SHAPES: dict[str, Any] = {
@@ -447,7 +452,7 @@ SHAPES: dict[str, Any] = {
     "search": FoundItems,
     "show": Shown,
     "order": OrderList,
-    "import": Imported,
+    "import": Imported | Undone,
     "whoami": Whoami,
     "logout": Logout,
     "serve": Greeting,

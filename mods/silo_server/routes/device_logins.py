@@ -16,11 +16,11 @@ from starlette.responses import Response
 from silo.api.wire import ErrorBody
 from silo_server.routes.answers import json_answer
 from silo_server.routes.call import ServerDep, client_address
-from silo_server.routes.requests import FORM_TYPES, form_of
+from silo_server.routes.requests import FORM_TYPES, BoundedRoute, form_of
 from silo_server.services.access import device_logins
 from silo_server.services.access.device_logins import INTERVAL_SECONDS, WAITS_SECONDS, Answer
 
-router = APIRouter(prefix="/api/auth/device", tags=["auth"])
+router = APIRouter(route_class=BoundedRoute, prefix="/api/auth/device", tags=["auth"])
 
 GRANT = "urn:ietf:params:oauth:grant-type:device_code"
 PAGE = "/login/device"

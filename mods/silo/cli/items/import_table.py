@@ -109,7 +109,7 @@ def _undo(args: argparse.Namespace) -> int:
     with client_of(args) as client:
         answer = client.undo_import(args.undo)
     if args.json:
-        print_json({**answer, "dry_run": False})
+        print_json(answer)
     else:
         words = message("Import {number} is undone: {file}", number=args.undo, file=plain(answer["file"]))
         console().print(Text(spoken(words)))
