@@ -51,6 +51,7 @@ def test_options_of_another_kind_are_refused(run: Any, files: dict[str, Path]) -
         assert run("import", kind, files[kind], *rest).code == Exit.BAD_INPUT
 
 
+@pytest.mark.usefixtures("silo")
 def test_an_import_is_taken_back_and_categories_come_in(
     run: Any, files: dict[str, Path], tmp_path: Path
 ) -> None:
