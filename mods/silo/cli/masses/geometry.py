@@ -61,7 +61,7 @@ _STAGES = {"reading": message("reading"), "measuring": message("measuring")}
 
 
 def _how_far(progress: Any) -> str:
-    stage = _STAGES.get(progress.stage, progress.stage)
+    stage: str = _STAGES.get(progress.stage, progress.stage)
     if not progress.total:
         return stage
     return message("{stage} {done}/{total}", stage=stage, done=progress.done, total=progress.total)
