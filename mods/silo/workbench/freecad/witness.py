@@ -235,7 +235,7 @@ class _Witness:
         if seen.shown == explained:
             if explained or not seen.hidden or key in self._named_hidden:
                 return
-            if is_shown or is_taken:
+            if is_shown or is_taken or _is_in_source(obj):
                 account.sources += seen.hidden
             else:
                 account.differ(obj, 0, 0, message("hidden and not counted"))
@@ -315,6 +315,15 @@ class _Seen:
         self.shown += solids[0]
         self.hidden += solids[1]
         self.left_out += solids[2]
+
+
+def _is_in_source(obj: Any, inside: tuple[Any, ...] = ()) -> bool:
+    """Return True for a member of a container that another object shows, such as the source of an array."""
+    return any(
+        _is_used_by(holder, _SHOWN_BY) or _is_in_source(holder, (*inside, obj))
+        for holder in obj.InList
+        if holder.Document == obj.Document and holder not in inside and _is_holder(holder)
+    )
 
 
 def _is_used_by(obj: Any, properties: Sequence[str], *, but_features: bool = False) -> bool:
