@@ -7,11 +7,17 @@ import re
 
 import pytest
 from server_testing import Api, bom
-from web_visitor import Visitor
+from web_visitor import ROLES, Visitor, newcomer
 
 from silo_server.run import RunningServer
 from silo_server.services import following
 from silo_server.services.looks import keep_looks
+
+
+@pytest.fixture
+def visitors(api: Api) -> dict[str, Visitor]:
+    """A new user per role: what others follow, and have not looked at, would count too."""
+    return {role: newcomer(api, role) for role in ROLES}
 
 
 def badge(visitor: Visitor) -> int:
@@ -117,7 +123,8 @@ def test_what_is_open_has_somebody_who_settles_it(api: Api, visitors: dict[str, 
     """While it is open it counts for that person; only who may change BOMs can be given one."""
     top, part, gone = api.items(3)
     api.merge(top, {part: 1, gone: 1})
-    editor, name = visitors["editor"], "editor"
+    editor, viewer = visitors["editor"], visitors["viewer"]
+    name, reader = editor.username, viewer.username
     assert editor.post("/waiting/assign", chosen=f"{top} -", assignee=name).status == 303
     assert badge(editor) == 0
     api.merge(top, {part: 1})
@@ -127,12 +134,11 @@ def test_what_is_open_has_somebody_who_settles_it(api: Api, visitors: dict[str, 
     assert f"/items/{top}/bom" in rows
     assert f"/items/{top}/bom" not in editor.get(f"/waiting?who=-&q={top}").body.decode()
     assert f"<option selected>{name}</option>" in editor.get(f"/items/{top}/bom").body.decode()
-    viewer = visitors["viewer"]
     api.good("POST", "/api/users", {"username": "former", "role": "editor"})
     assert "<option>former</option>" in editor.get(f"/items/{top}/bom").body.decode()
     api.good("PUT", "/api/users/former", {"active": False})
     assert "<option>former</option>" not in editor.get(f"/items/{top}/bom").body.decode()
-    for one, status in (("viewer", 403), ("former", 403), ("nobody-of-this-name", 404)):
+    for one, status in ((reader, 403), ("former", 403), ("nobody-of-this-name", 404)):
         assert editor.post("/waiting/assign", chosen=f"{top} -", assignee=one).status == status
     assert viewer.post("/waiting/assign", chosen=f"{top} -", assignee=name).status == 403
     assert badge(editor) == 1

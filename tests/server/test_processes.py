@@ -5,9 +5,10 @@ from __future__ import annotations
 
 import os
 import signal
+import sqlite3
 import threading
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,7 @@ from server_testing import Api, Databases, ServerProcess, sqlite_database, wait_
 from silo.bom.errors import ConfigError
 from silo.cli.main import main
 from silo_server.db.database import Database
+from silo_server.db.engine import write_ahead
 from silo_server.run import Welcome, _without_password, is_loopback, prepare, running_server, serve
 from silo_server.settings import Settings
 
@@ -154,6 +156,27 @@ def test_two_servers_may_start_at_once(empty_url: str, tmp_path: Path) -> None:
 
     with ThreadPoolExecutor(2) as pool:
         assert [(one.username, one.token) for one in pool.map(start, range(2))] == [("admin", TOKEN)] * 2
+
+
+def test_a_new_database_that_another_server_writes_to_is_waited_for(tmp_path: Path) -> None:
+    """SQLite does not wait before it changes the journal; a start does, and not without end."""
+    path = tmp_path / "new.db"
+    with (
+        closing(sqlite3.connect(path, isolation_level=None)) as other,
+        closing(sqlite3.connect(path, isolation_level=None, timeout=0)) as own,
+    ):
+        other.execute("BEGIN IMMEDIATE")
+        with pytest.raises(sqlite3.OperationalError, match="locked"):
+            write_ahead(own, seconds=0)
+        pauses: list[float] = []
+
+        def pause(seconds: float) -> None:
+            pauses.append(seconds)
+            other.execute("COMMIT")
+
+        write_ahead(own, pause=pause)
+        assert len(pauses) == 1
+        assert own.execute("PRAGMA journal_mode").fetchone() == ("wal",)
 
 
 def test_what_cannot_be_served_is_one_plain_sentence(

@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from urllib.parse import urlencode
+from uuid import uuid4
 
 from server_testing import Answer, Api
 
@@ -30,6 +31,11 @@ class Visitor:
         """A form, with the secret unless another is given; a list is a field that stands there often."""
         sent = urlencode({"csrf_token": self.csrf if csrf is None else csrf, **fields}, doseq=True).encode()
         return self.api.call("POST", path, body=sent, headers={"Cookie": self.cookie, **HTML, **FORM})
+
+    @property
+    def username(self) -> str:
+        """Whose session it is."""
+        return str(self.get("/api/auth/me").json()["username"])
 
 
 SECOND_ADMIN = "second-admin"
@@ -56,6 +62,13 @@ def enter(api: Api, username: str) -> Visitor:
     found = re.search(r'name="csrf_token" value="([^"]+)"', page)
     assert found is not None
     return Visitor(browser, cookie, found[1])
+
+
+def newcomer(api: Api, role: str) -> Visitor:
+    """A session of a new user, of whom no other test knows."""
+    username = f"{role}-{uuid4().hex[:8]}"
+    api.good("POST", "/api/users", {"username": username, "role": role})
+    return enter(api, username)
 
 
 def visitors_of(api: Api) -> dict[str, Visitor]:

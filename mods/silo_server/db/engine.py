@@ -7,8 +7,9 @@ given up by us.
 
 from __future__ import annotations
 
+import sqlite3
 import time
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,8 @@ WAIT_SECONDS = 10
 # [s] For so long one statement may run; far more than the largest merge needs.
 READ_SECONDS, WRITE_SECONDS = 20, 40
 CONNECT_SECONDS = 5
+# [s] Between two tries to change the journal of a database.
+WAL_SECONDS = 0.02
 # Connections to PostgreSQL, per process.
 READERS, WRITERS = 10, 6
 
@@ -123,11 +126,34 @@ def _prepare_sqlite(connection: Any, _record: Any) -> None:
     # The driver must not begin or commit by itself: a merge is exactly one transaction of ours.
     connection.isolation_level = None
     try:
-        for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "cache_size=-32000"):
+        write_ahead(connection)
+        for pragma in ("synchronous=FULL", "foreign_keys=ON", "cache_size=-32000"):
             connection.execute(f"PRAGMA {pragma}").close()
     except BaseException:
         connection.close()  # the pool does not know it yet
         raise
+
+
+def write_ahead(
+    connection: sqlite3.Connection,
+    seconds: float = WAIT_SECONDS,
+    pause: Callable[[float], object] = time.sleep,
+) -> None:
+    """Change the journal of the database to WAL; wait up to ``seconds`` for another connection that writes.
+
+    The busy time-out of SQLite does not hold for this change: if another process writes to a database that is
+    not WAL yet, the answer is SQLITE_BUSY at once. That is so while two servers start over a new database.
+    """
+    until = time.monotonic() + seconds
+    while True:
+        try:
+            connection.execute("PRAGMA journal_mode=WAL").close()
+            return
+        except sqlite3.OperationalError as error:
+            # The low byte is the kind; the others are its reason.
+            if error.sqlite_errorcode & 0xFF != sqlite3.SQLITE_BUSY or time.monotonic() >= until:
+                raise
+        pause(WAL_SECONDS)
 
 
 def _begin_sqlite(conn: Connection) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import uuid
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -36,8 +37,13 @@ UNREGISTERED, NEW = "MotorMount", "Cover"
 
 @pytest.fixture(name="story", scope="module")
 def _story(tmp_path_factory: pytest.TempPathFactory) -> Iterator[GearboxStory]:
-    """Every kind of difference at once, in the top assembly and below it."""
-    folder = tmp_path_factory.mktemp("preview")
+    """Every kind of difference at once, in the top assembly and below it; no test changes it."""
+    with a_story(tmp_path_factory.mktemp("preview")) as story:
+        yield story
+
+
+@contextmanager
+def a_story(folder: Path) -> Iterator[GearboxStory]:
     token = "silo_" + uuid.uuid4().hex
     with (
         pytest.MonkeyPatch.context() as patch,
@@ -263,13 +269,11 @@ def test_a_missing_component_is_a_row_of_its_own_kind(tmp_path: Path) -> None:
     assert summary(preview) == "1 missing"
 
 
-def test_what_a_sync_would_not_send_is_not_offered_below(story: GearboxStory) -> None:
-    """The sync's own decision: the server knows already that a line of the gearbox is unreferenced.
-
-    The last test of the module, since it syncs.
-    """
-    story.sync()
-    preview = preview_of(story)
+def test_what_a_sync_would_not_send_is_not_offered_below(tmp_path: Path) -> None:
+    """The sync's own decision: the server knows already that a line of the gearbox is unreferenced."""
+    with a_story(tmp_path) as story:
+        story.sync()
+        preview = preview_of(story)
     (gearbox,) = preview.compared[:-1]
     assert gearbox.diff.removed
     assert preview.to_send_below == 0
