@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 from xml.parsers import expat
 
 import numpy as np
@@ -55,13 +55,18 @@ class LinkSpan:
 
 @dataclass(eq=False)
 class UrdfShape:
-    """A visual or collision shape of a link: its origin, its kind, and the values that the file gives it."""
+    """A visual or collision shape of a link: its origin, its kind, and the values that the file gives it.
+
+    place
+        (4, 4) in the link's frame, if the file does not say it as ``xyz`` and ``rpy``.
+    """
 
     collision: bool
     xyz: tuple[float, ...] = (0.0, 0.0, 0.0)
     rpy: tuple[float, ...] = (0.0, 0.0, 0.0)
     kind: str = ""
     values: dict[str, str] = field(default_factory=dict)
+    place: Floats | None = None
 
 
 def read_bytes(path: Path | str) -> bytes:
@@ -112,6 +117,9 @@ class UrdfText:
     robot: str = ""
     pose: Mapping[str, float] = field(default_factory=dict)
 
+    kind: ClassVar[str] = "urdf"
+    """Which form of ``<inertial>`` it has."""
+
     def __post_init__(self) -> None:
         if self.data[:2] in (b"\xff\xfe", b"\xfe\xff"):
             raise InputError(f"{self.source}: UTF-16 is not supported for a URDF; save it as UTF-8")
@@ -132,6 +140,11 @@ class UrdfText:
         ]
         if problems:
             raise InputError(f"{self.source}: {'; '.join(problems)}; a link and its inertial are there once")
+
+    @property
+    def unused(self) -> str:
+        """Say why the simulator would not use what is filled in; "" if it does."""
+        return ""
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -52,7 +52,7 @@ def add_inertia(parser: argparse.ArgumentParser) -> None:
         "--urdf-out",
         "--in-place",
         metavar="ASSEMBLY",
-        help="a STEP, mesh or FCStd file, or a URDF with its meshes",
+        help="a STEP, mesh or FCStd file, or a URDF or MJCF file with its meshes",
     )
     group = parser.add_argument_group("links")
     add_options(
@@ -84,7 +84,7 @@ def add_inertia(parser: argparse.ArgumentParser) -> None:
         },
     )
     text = "write the URDF with its <inertial> here, the rest of it untouched"
-    add_outputs(parser, {"--urdf-out FILE": text}, beginning("a URDF", "<robot[ >]"), group)
+    add_outputs(parser, {"--urdf-out FILE": text}, beginning("a URDF", "<(?:robot|mujoco)[ >]"), group)
     group.add_argument(
         "--snippet",
         choices=SNIPPETS,
@@ -204,10 +204,10 @@ def _refuse_another_robot(path: str, urdf: Urdf) -> None:
 
 
 def is_urdf(path: str) -> bool:
-    """Return True if the geometry is a URDF, which then is also the file to fill."""
+    """Return True if the geometry is a URDF or MJCF file, which then is also the file to fill."""
     from silo.inertia.geometry.formats import Format, detect
 
-    return Path(path).is_file() and detect(Path(path)) is Format.URDF
+    return Path(path).is_file() and detect(Path(path)) in (Format.URDF, Format.MJCF)
 
 
 def _write_urdf(args: argparse.Namespace, report: InertiaReport, urdf: Urdf) -> None:

@@ -26,11 +26,12 @@ class Format(StrEnum):
     THREEMF = "3mf"
     DAE = "dae"
     URDF = "urdf"
+    MJCF = "mjcf"
 
     @property
     def is_mesh(self) -> bool:
         """Return True if the format has triangles and needs no geometry kernel."""
-        return self not in (Format.STEP, Format.BREP, Format.FREECAD, Format.URDF)
+        return self not in (Format.STEP, Format.BREP, Format.FREECAD, Format.URDF, Format.MJCF)
 
     @property
     def needs_kernel(self) -> bool:
@@ -55,7 +56,7 @@ _OTHERS = {
 """What is refused with a word of its own, by its first bytes."""
 
 _START = re.compile(rb"<(\w+)")
-_XML = {b"COLLADA": Format.DAE, b"robot": Format.URDF}
+_XML = {b"COLLADA": Format.DAE, b"robot": Format.URDF, b"mujoco": Format.MJCF}
 
 _HEAD_BYTES = 1024
 

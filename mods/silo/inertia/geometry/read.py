@@ -104,7 +104,7 @@ def _reading(path: Path, options: ReadOptions, report: Report, helpers: Helpers)
         from silo.inertia.geometry.step import read_step
 
         return read_step(path, options, report, helpers, text)
-    if kind is Format.URDF:
+    if kind in (Format.URDF, Format.MJCF):
         from silo.inertia.geometry.robot import read_robot
 
         return read_robot(path, options, report)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""A URDF as geometry: each link is a sub-assembly, with the shapes that the file gives it.
+"""A URDF or MJCF file as geometry: each link is a sub-assembly, with the shapes that the file gives it.
 
 * A link weighs what its visual shapes enclose; its collision shapes count only if it has no visual one.
 * Meshes are in metres, as the format has it, but for those whose file states a unit; a scale counts.
@@ -27,18 +27,19 @@ from silo.inertia.geometry.options import ReadOptions, Report
 from silo.inertia.geometry.reading import GeometryReading
 from silo.inertia.geometry.together import Floats, Mesh, joined
 from silo.inertia.links.frames import origin_frame
+from silo.inertia.mjcf_text import read_text
 from silo.inertia.notes import GeometryCode, Note
-from silo.inertia.urdf_text import UrdfShape, UrdfText, read_bytes
+from silo.inertia.urdf_text import UrdfShape
 
 LEVELS_UP = 6
 """Folders above the URDF in which the package of a mesh is looked for."""
 
 
 def read_robot(path: Path, options: ReadOptions, report: Report) -> GeometryReading:
-    """Read the links of a URDF with their shapes. Raises DocumentError."""
+    """Read the links of a URDF, or the bodies of an MJCF file, with their shapes. Raises DocumentError."""
     report("reading", 0, 0)
     try:
-        urdf = UrdfText(read_bytes(path), str(path))
+        urdf = read_text(path)
         if urdf.problem:
             raise InputError(urdf.problem)
     except InputError as error:
@@ -62,6 +63,8 @@ def read_robot(path: Path, options: ReadOptions, report: Report) -> GeometryRead
 
 
 def _origin(path: Path, link: str, shape: UrdfShape) -> Floats:
+    if shape.place is not None:
+        return shape.place
     if len(shape.xyz) != 3 or len(shape.rpy) != 3 or not np.isfinite([*shape.xyz, *shape.rpy]).all():
         reason = message(
             "a shape of the link {link} has no readable origin; wanted three numbers each", link=link
@@ -92,7 +95,7 @@ class _Shapes:
         if shape.kind != "mesh":
             return _primitive(self.path, key, shape)
         named = shape.values.get("filename", "")
-        name = Path(named.replace("\\", "/")).stem or "mesh"
+        name = shape.values.get("name") or Path(named.replace("\\", "/")).stem or "mesh"
         file = found_mesh(self.path, named)
         if file is None:
             words: str = message(
@@ -163,6 +166,11 @@ def _primitive(path: Path, key: str, shape: UrdfShape) -> Prototype:
         volume = x * y * z
         diagonal = np.array([y * y + z * z, x * x + z * z, x * x + y * y]) / 12
         name = message("box {x} × {y} × {z} m", x=f"{x:g}", y=f"{y:g}", z=f"{z:g}")
+    elif shape.kind == "ellipsoid":
+        x, y, z = _values(path, shape, "size", 3)
+        volume = math.pi / 6 * x * y * z
+        diagonal = np.array([y * y + z * z, x * x + z * z, x * x + y * y]) / 20
+        name = message("ellipsoid {x} × {y} × {z} m", x=f"{x:g}", y=f"{y:g}", z=f"{z:g}")
     elif shape.kind == "sphere":
         (r,) = _values(path, shape, "radius", 1)
         volume, diagonal = 4 / 3 * math.pi * r**3, np.full(3, 2 / 5 * r * r)
