@@ -66,7 +66,12 @@ def begin(code: str, home: Path, library: Path | None, *arguments: str) -> subpr
 
 def said(process: subprocess.Popen[str]) -> str:
     """Wait for its end, and return what it said."""
-    text, _ = process.communicate(timeout=300)
+    with process:
+        try:
+            text, _ = process.communicate(timeout=300)
+        except BaseException:
+            process.kill()  # it is waited for, so that it does not end in the time of another test
+            raise
     assert process.returncode == 0, text
     return text.strip()
 
@@ -79,7 +84,7 @@ def test_commits_are_kept_and_programs_take_turns(library: Path, tmp_path: Path,
     (tmp_path / "local").mkdir()
     if had_locks:
         said(begin(KEEP, home, None, "before"))
-    both = [begin(KEEP, home, library, name) for name in ("A", "B")]
-    assert [said(one) for one in both] == ["", ""]
+    with begin(KEEP, home, library, "A") as one, begin(KEEP, home, library, "B") as other:
+        assert (said(one), said(other)) == ("", "")
     count = 12 if had_locks else 8
     assert said(begin(SEND, home, library)) == f"True False {count} {{'waiting'}}"

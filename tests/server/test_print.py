@@ -143,6 +143,7 @@ def test_a_review_waits_for_those_who_may_approve(api: Api, visitors: dict[str, 
     part = api.item()
     api.merge(top, {part: 1})
     before = badge(visitors["editor"])
+    api.good("PUT", "/api/users/admin", {"approver": True})
     api.good("POST", f"/api/items/{top}/releases", {"with_parts": True, "comment": "please look"})
     assert top in visitors["viewer"].get("/waiting").body.decode()
     assert "Nothing waits" not in visitors["viewer"].get("/waiting").body.decode()

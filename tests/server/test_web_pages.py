@@ -85,7 +85,7 @@ def make_busy(api: Api) -> dict[str, str]:
     body, headers = form_body({"file": ("<b>x</b>.FCStd", model_file(b"x")), "comment": HOSTILE, **about})
     assert api.call("POST", f"/api/documents/{sheet}/file", body=body, headers=headers).status == 201
     api.good("POST", "/api/auth/tokens", {"name": HOSTILE})
-    api.good("POST", "/api/users", {"username": "odd", "display_name": HOSTILE})
+    api.good("POST", "/api/users", {"username": f"odd-{sheet}", "display_name": HOSTILE})
     return {"parent": parent, "used": used, "disputed": disputed, "sheet": sheet, "uuid": item}
 
 
@@ -182,10 +182,10 @@ def test_every_page_on_the_other_database(databases: Databases, tmp_path: Path) 
 
 
 def test_a_file_of_several_items_is_on_their_pages_and_has_one(
-    visitors: dict[str, Visitor], busy: dict[str, str]
+    visitors: dict[str, Visitor], api: Api
 ) -> None:
     """The item names its files; the page of a file its items, what uses it, and each revision to download."""
-    viewer = visitors[VIEWER]
+    viewer, busy = visitors[VIEWER], make_busy(api)  # the newest, for the activity shows no more than a page
     item = unescape(viewer.get(f"/items/{busy['used']}").body.decode())
     assert f'<a href="/documents/{busy["uuid"]}">' in item
     assert f'<a href="/documents/{busy["sheet"]}">' in item

@@ -15,7 +15,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import ExitStack, closing
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any
@@ -457,13 +457,14 @@ def _processes(folder: Path, index: Path, count: int) -> Iterator[subprocess.Pop
 def test_two_processes_at_once_and_somebody_who_works(vault: Path, tmp_path: Path) -> None:
     """Both end well, and the index is true afterwards."""
     index = tmp_path / "index"
-    running = list(_processes(vault, index, 2))
-    number = 0
-    while any(process.poll() is None for process in running):
-        number += 1
-        part("a", uuid=f"u{number}").save(vault / "a.FCStd")
-        assembly("c", {"a.FCStd": number % 7 + 1, "b.FCStd": 1}).save(vault / "c.FCStd")
-        if number == 5:
-            index.unlink(missing_ok=True)
-    assert [process.wait() for process in running] == [0, 0]
+    with ExitStack() as stack:
+        running = [stack.enter_context(process) for process in _processes(vault, index, 2)]
+        number = 0
+        while any(process.poll() is None for process in running):
+            number += 1
+            part("a", uuid=f"u{number}").save(vault / "a.FCStd")
+            assembly("c", {"a.FCStd": number % 7 + 1, "b.FCStd": 1}).save(vault / "c.FCStd")
+            if number == 5:
+                index.unlink(missing_ok=True)
+        assert [process.wait() for process in running] == [0, 0]
     assert indexed(vault, index)[0] == truth(vault)

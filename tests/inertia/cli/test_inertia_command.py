@@ -25,6 +25,7 @@ import yaml
 from silo.bom.errors import InputError
 from silo.cli.masses.geometry import read_options
 from silo.cli.parser import build_parser
+from silo.platform.processes import end
 
 Run = Callable[..., Any]
 SCHEMA = Path(__file__).parents[3] / "mods" / "silo" / "inertia" / "schema.json"
@@ -430,21 +431,24 @@ def test_ctrl_c_is_a_plain_sentence(arm: Path) -> None:
         start_new_session=True,
     )
     os.close(child)
-    # Its reader is halted early, so that the reading cannot be done before the signal comes.
-    reader = reader_of(process.pid)
-    os.kill(reader, signal.SIGSTOP)
-    seen = b""
-    deadline = time.monotonic() + 60
-    while b"arm.step" not in seen and time.monotonic() < deadline:
-        seen += os.read(parent, 4096)
-    process.send_signal(signal.SIGINT)
-    out, _ = process.communicate(timeout=60)
-    rest = b""
     try:
-        while piece := os.read(parent, 4096):
-            rest += piece
-    except OSError:  # the terminal's other end is closed: all was read
-        pass
+        # Its reader is halted early, so that the reading cannot be done before the signal comes.
+        reader = reader_of(process.pid)
+        os.kill(reader, signal.SIGSTOP)
+        seen = b""
+        deadline = time.monotonic() + 60
+        while b"arm.step" not in seen and time.monotonic() < deadline:
+            seen += os.read(parent, 4096)
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate(timeout=60)
+        rest = b""
+        try:
+            while piece := os.read(parent, 4096):
+                rest += piece
+        except OSError:  # the terminal's other end is closed: all was read
+            pass
+    finally:
+        end(process)
     os.close(parent)
     assert process.returncode == 130
     assert out == b""
