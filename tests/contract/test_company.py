@@ -13,6 +13,7 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
@@ -81,25 +82,46 @@ def table(data: bytes) -> Rows:
     ]
 
 
-def test_the_parts_come_out_as_they_came_in(company: Api, export: Path, truth: dict[str, Any]) -> None:
-    """Each of 800 parts by its number, or by its name if it has none; the same from CSV and workbook."""
+@dataclass(frozen=True)
+class PartsImport:
+    """What the server said of the company's parts, and how they came out, before anything else came in."""
+
+    checked: dict[str, Any]
+    made: dict[str, int]
+    again: list[dict[str, int]]
+    exported: bytes
+
+
+@pytest.fixture(scope="module")
+def parts(company: Api, export: Path) -> PartsImport:
+    """The company's 800 parts, which each test needs; the same from CSV and workbook."""
     data = (export / "parts.csv").read_bytes()
-    checked = company.good("POST", "/api/items/import?dry_run=1", body=data)
-    assert Counter(row["status"] for row in checked["rows"]) == {"add": 798, "error": 2}
-    assert all("more than once" in problem for problem in checked["problems"])
-    assert "In Stock" in checked["unused_columns"]
     where = "/api/items/import?duplicates=new"
-    assert company.good("POST", where, body=data)["counts"]["add"] == 800
-    for file in ("parts.csv", "parts.xlsx"):
-        again = company.good("POST", where, body=(export / file).read_bytes())
-        assert again["counts"] == {"add": 0, "change": 0, "same": 800, "skip": 0, "error": 0}
+    return PartsImport(
+        company.good("POST", "/api/items/import?dry_run=1", body=data),
+        company.good("POST", where, body=data)["counts"],
+        [
+            company.good("POST", where, body=(export / file).read_bytes())["counts"]
+            for file in ("parts.csv", "parts.xlsx")
+        ],
+        company.call("GET", "/api/items/export.csv").body,
+    )
+
+
+def test_the_parts_come_out_as_they_came_in(parts: PartsImport, export: Path, truth: dict[str, Any]) -> None:
+    """Each of 800 parts by its number, or by its name if it has none; again it changes nothing."""
+    assert Counter(row["status"] for row in parts.checked["rows"]) == {"add": 798, "error": 2}
+    assert all("more than once" in problem for problem in parts.checked["problems"])
+    assert "In Stock" in parts.checked["unused_columns"]
+    assert parts.made["add"] == 800
+    assert parts.again == [{"add": 0, "change": 0, "same": 800, "skip": 0, "error": 0}] * 2
     categories = {
         row["Code"]: f"{row['Parent']}/{row['Name']}"
         for row in csv.DictReader(io.StringIO(categories_of(export)))
     }
-    assert Counter(
-        out(row, categories) for row in table(company.call("GET", "/api/items/export.csv").body)
-    ) == (Counter(into(part, truth["parts"]) for part in truth["parts"]))
+    assert Counter(out(row, categories) for row in table(parts.exported)) == (
+        Counter(into(part, truth["parts"]) for part in truth["parts"])
+    )
 
 
 def into(part: dict[str, Any], parts: list[dict[str, Any]]) -> tuple[str, ...]:
@@ -128,6 +150,7 @@ def out(row: dict[str, str], categories: dict[str, str]) -> tuple[str, ...]:
     return ("" if given else number, *(row[n] for n in names), categories[code], *(row[n] for n in rest))
 
 
+@pytest.mark.usefixtures("parts")
 def test_the_prices_come_out_as_they_came_in(company: Api, export: Path, truth: dict[str, Any]) -> None:
     """Each price of each supplier part; rows without a part number are left out by name, if that is said."""
     data = (export / "price_breaks.csv").read_bytes()
@@ -169,6 +192,7 @@ def test_the_prices_come_out_as_they_came_in(company: Api, export: Path, truth: 
     assert {item["status"] for item in back["items"]} == {"same"}
 
 
+@pytest.mark.usefixtures("parts")
 def test_the_boms_come_out_as_they_came_in(company: Api, export: Path, truth: dict[str, Any]) -> None:
     """Each fitted line, with quantity, designators and note; what is not fitted is left out by name."""
     numbers = {part["id"]: part["IPN"].strip() for part in truth["parts"]}

@@ -37,12 +37,10 @@ ROWS: list[tuple[tuple[str, str], dict[str, Any], bool]] = [
     (ITEM, {}, False),
     (ITEM, {"category": None, "part_number": None}, False),
     (ITEM, {"category": "F01", "item_type": "bolt"}, False),
-    (ITEM, {"part_number": "a/b"}, False),
+    (ITEM, {"part_number": "a/b"}, True),
     (ITEM, {"part_number": "a\u0001b"}, False),
-    (ITEM, {"part_number": ".."}, False),
-    (ITEM, {"part_number": "search"}, False),
-    (ITEM, {"part_number": " ſEARCH\t"}, False),
-    (ITEM, {"part_number": "\t\n ."}, False),
+    (ITEM, {"part_number": ".."}, True),
+    (ITEM, {"part_number": "search"}, True),
     (ITEM, {"part_number": "a\u0085b"}, False),
     (ITEM, {"part_number": "\n\fa"}, False),
     (ITEM, {"part_number": "a\x1f"}, False),
@@ -228,7 +226,9 @@ def test_an_operation_that_refuses_what_has_the_right_form_says_why(api: Api, do
         for method, operation in operations.items()
         if REFUSED in operation
     }
-    expected = "file file files geometry import import import merge resolve structure suppliers thumbnail"
+    expected = (
+        "file file files geometry import import import import merge resolve structure suppliers thumbnail"
+    )
     assert sorted(name.rpartition("/")[2] for name in told) == expected.split()
     for operation in told.values():
         assert operation[REFUSED] in operation["responses"]["400"]["description"]
@@ -251,7 +251,7 @@ def test_a_repeat_is_judged_like_the_first_request(api: Api) -> None:
         {"item_type": "bolt"},
         {"category": "nothing"},
         {"category": None},
-        {"part_number": "a/b"},
+        {"part_number": "a\x01b"},
     ):
         assert api.call("POST", "/api/items", {**first, **more}).status == 400, more
     assert api.call("POST", "/api/items", first).status == 200

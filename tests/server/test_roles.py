@@ -32,7 +32,7 @@ OF_VIEWERS = {
     "POST /api/items/{part_number}/releases/{label}/approval",
     "POST /api/items/{part_number}/releases/{label}/end",
 }
-OF_ADMINS = re.compile("[A-Z]+ /api/(admin|users)|PUT /api/rates")
+OF_ADMINS = re.compile("[A-Z]+ /api/(admin|users)|PUT /api/rates|POST /api/categories/import")
 
 PARAMETERS = {
     "token_id": "999999",

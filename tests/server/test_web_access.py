@@ -42,7 +42,8 @@ OF_VIEWERS = {
     "POST /items/{part_number}/releases/{label}/end",
 }
 OF_EDITORS = {"GET /items/new", "GET /items/{part_number}/edit", "GET /items/{part_number}/import"}
-OF_ADMINS = re.compile("[A-Z]+ /(users|mode|audit|system)|POST /suppliers/rates")
+OF_EDITORS |= {"GET /items/import"}
+OF_ADMINS = re.compile("[A-Z]+ /(users|mode|audit|system)|POST /suppliers/rates|POST /categories")
 ROUTES = [route for router in ROUTERS for route in router.routes if isinstance(route, APIRoute)]
 NAMED = {f"{method} {route.path}" for route in ROUTES for method in route.methods}
 CHANGING = sorted(route.removeprefix("POST ") for route in NAMED - PUBLIC if route.startswith("POST "))

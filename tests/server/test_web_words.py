@@ -56,7 +56,7 @@ def test_small_words() -> None:
         '<time datetime="2026-02-08T22:15:00.123456Z">2026-02-08 22:15</time>'
     )
     assert when(None) == "–"
-    assert segment("A/B 1#") == "A%2FB%201%23"
+    assert segment("A/B 1#") == "A~2FB%201%23"
 
 
 @pytest.mark.parametrize(
@@ -162,7 +162,7 @@ def test_a_merge_has_its_counts() -> None:
         ("warn", 1),
         ("conflict", 1),
     ]
-    assert (entry.link, entry.user) == ("/items/A%2F1/bom", "designer")
+    assert (entry.link, entry.user) == ("/items/A~2F1/bom", "designer")
     assert entry_of(LoggedEvent(1, "bom_merge", '{"item": "A", "diff": {}}', "2026")).counts[0][1] == 0
 
 

@@ -203,6 +203,15 @@ def _named(columns: Columns) -> set[str]:
     return {Heading.MANUFACTURER_NUMBER, Heading.VALUE} if Heading.NAME in columns.at else set()
 
 
+def _with_its_name_on_one_line(row: SheetRow, column: int | None) -> SheetRow:
+    """Drop the line breaks of a name, which a workbook has where its column is narrow."""
+    if column is None or column >= len(row.cells) or "\n" not in row.cells[column]:
+        return row
+    cells = [*row.cells]
+    cells[column] = " ".join(cells[column].splitlines())
+    return row._replace(cells=tuple(cells))
+
+
 def _sheet(
     records: list[SheetRow],
     best: _Header,
@@ -243,6 +252,7 @@ def _sheet(
     if grid is not None:
         shown = as_shown(records, grid, header, sorted(columns.used))
         records, hidden, struck = shown.records, shown.hidden, shown.struck
+        records = [_with_its_name_on_one_line(row, columns.at.get(Heading.NAME)) for row in records]
         notes += shown.notes
     rows = tuple(
         row

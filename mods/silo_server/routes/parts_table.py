@@ -82,7 +82,7 @@ def undo_import(call: Editor, import_id: int) -> dict[str, Any]:
     """
     with call.write() as tx:
         undone = import_undo.undo_import(tx, import_id)
-    return {"import": undone.id, "kind": undone.kind, "file": undone.file_name}
+        return {"import": undone.id, "kind": undone.kind, "file": undone.file_name}
 
 
 @router.get("/categories/export.csv", response_class=Response, responses=content_of("text/csv"))

@@ -255,7 +255,7 @@ CELL = "<table:table-row><table:table-cell {}</table:table-cell></table:table-ro
     [
         ("><x:p>no type</x:p>", "no type"),
         ('o:value-type="string" o:string-value="value">', "value"),
-        ('o:value-type="string"><x:p>a</x:p><x:p>b</x:p>', "a b"),
+        ('o:value-type="string"><x:p>a</x:p><x:p>b</x:p>', "a\nb"),
         ('o:value-type="string"><x:p>\n  a<x:s x:c="3"/>b<x:tab/>c</x:p>', " a   b c"),
         ('o:value-type="string"><x:p>a<x:span>b</x:span>c<x:line-break/>d</x:p>', "abc d"),
         ("><o:annotation><x:p>no</x:p></o:annotation><x:p>a</x:p>", "a"),
@@ -334,7 +334,7 @@ def test_styles_of_an_ods_file_are_inherited() -> None:
     [
         ('t="inlineStr"><is><t>a</t></is>', "a"),
         ('t="inlineStr"><is><r><t>a</t></r><r><rPr><b/></rPr><t> b</t></r><rPh><t>no</t></rPh></is>', "a b"),
-        ('t="inlineStr"><is><t>a_x000D_\n_x263A_</t></is>', "a ☺"),
+        ('t="inlineStr"><is><t>a_x000D_\n_x263A_</t></is>', "a\n☺"),
         ('t="str"><f>A1</f><v>text</v>', "text"),
         ('t="str"><f>A1</f>', None),
         ('><f t="shared" si="0"/>', "=…"),

@@ -17,7 +17,7 @@ WORDS = frozenset({"by-uuid", "search", "export.csv", "import", "new"})
 _WORD = "~_"
 _ESCAPES = {"/": "~2F", "~": "~7E"}
 _ESCAPED = {escape: character for character, escape in (*_ESCAPES.items(), (".", "~2E"))}
-_ESCAPE = re.compile("|".join(map(re.escape, _ESCAPED)))
+_ESCAPE = re.compile("~2F|~7E|~2E")
 
 
 def part_segment(part_number: str) -> str:
