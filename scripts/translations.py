@@ -323,7 +323,8 @@ changes|event streams|Link|Part|Qty|Matched|Material|Parts|Source|exact|normalis
 zero|parent|remaining|order|{n} warning|{n} warnings|summaries to be kept|Supplier|Needed|Ordered|Cost|bought
 made|unsaid
 {n} conflict|{n} conflicts|at least {low} and at most {high}|viewer|editor|admin|review|released|obsolete
-draft|Draft|archived|changed|mass|size|volume|material|description|quantity {before} → {after}|notes|unit
+draft|Draft|drawing|data sheet|picture|certificate
+archived|changed|mass|size|volume|material|description|quantity {before} → {after}|notes|unit
 source|reason|revision|hidden|unreferenced|metadata|rel type
 reference designators|find number|child revision|override|cad quantity|unreferenced since
 Field required|Input should be a valid integer, unable to parse string as an integer
@@ -509,6 +510,9 @@ def _texts_of_silo(package: Path) -> Iterator[tuple[str, str, Path]]:
             for text, many, where in texts_of_sentences(path):
                 if not lists.issuperset(text.split()):
                     yield text, many, where
+        elif name.startswith("silo_server/"):
+            tree = ast.parse(path.read_text("utf-8"), str(path))
+            yield from ((text, many, path) for text, many, _literals in _templates(tree, path))
 
 
 def _labels_of_server() -> Iterator[tuple[str, str, Path]]:
@@ -520,6 +524,7 @@ def _labels_of_server() -> Iterator[tuple[str, str, Path]]:
     labels = [text for field in schema.find_schema(None).fields for text in (field.label, field.title)]
     for label in dict.fromkeys(filter(None, (*suppliers.COLUMNS.values(), *labels))):
         yield f"{label}: {{problem}}", "", path
+        yield label, "", path
     for column in suppliers.COLUMNS.values():
         yield f"{column.lower().replace(',', '')} {{before}} → {{after}}", "", Path(suppliers.__file__)
 

@@ -13,6 +13,7 @@ from silo.bom.errors import (
     VersionConflictError,
     listed,
 )
+from silo.bom.message import message
 
 
 class TooLargeError(RejectedError):
@@ -59,8 +60,11 @@ class ArchivedPartsError(ConflictError):
 
     def __init__(self, part_numbers: Sequence[str]) -> None:
         super().__init__(
-            f"nothing was restored: archived parts would come back ({listed(part_numbers, 10)}); say that "
-            "they may (with_archived)"
+            message(
+                "nothing was restored: archived parts would come back ({part_numbers}); say that they may "
+                "(with_archived)",
+                part_numbers=listed(part_numbers, 10),
+            )
         )
         self.part_numbers = tuple(part_numbers)
 

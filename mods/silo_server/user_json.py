@@ -14,6 +14,7 @@ from decimal import Decimal
 from typing import Any
 
 from silo.bom.errors import RejectedError
+from silo.bom.message import message
 from silo.bom.text import character_problem
 
 MAX_DEPTH = 32
@@ -36,13 +37,17 @@ def json_problem(value: Any) -> str | None:
     while stack:
         part, depth = stack.pop()
         if depth > MAX_DEPTH and isinstance(part, dict | list | tuple):
-            return f"wanted at most {MAX_DEPTH} levels of nesting, got more"
+            return message("wanted at most {most} levels of nesting, got more", most=MAX_DEPTH)
         if isinstance(part, dict):
             for key in part:
                 if problem := character_problem(key):
                     return problem
                 if len(key) > MAX_KEY:
-                    return f"wanted keys of at most {MAX_KEY} characters, got {key[:60]!r}"
+                    return message(
+                        "wanted keys of at most {most} characters, got {got}",
+                        most=MAX_KEY,
+                        got=repr(key[:60]),
+                    )
             stack.extend((below, depth + 1) for below in part.values())
         elif isinstance(part, list | tuple):
             stack.extend((below, depth + 1) for below in part)
@@ -50,7 +55,9 @@ def json_problem(value: Any) -> str | None:
             return problem
     size = len(dumps(value).encode())
     if size > MAX_BYTES:
-        return f"wanted at most {MAX_BYTES // 1024} KiB of JSON, got {size // 1024} KiB"
+        return message(
+            "wanted at most {most} KiB of JSON, got {size} KiB", most=MAX_BYTES // 1024, size=size // 1024
+        )
     return None
 
 
@@ -81,7 +88,7 @@ def _scalar_problem(value: Any) -> str | None:
     if isinstance(value, str):
         return character_problem(value)
     if isinstance(value, float) and not math.isfinite(value):
-        return f"wanted finite numbers, got {value}"
+        return message("wanted finite numbers, got {got}", got=value)
     if isinstance(value, int) and not -_MAX_WHOLE <= value <= _MAX_WHOLE:
-        return "wanted numbers of at most 309 digits, got a longer one; send it as text"
+        return message("wanted numbers of at most 309 digits, got a longer one; send it as text")
     return None

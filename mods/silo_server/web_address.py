@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 
+from silo.bom.message import message
 from silo.bom.text import character_problem
 
 LONGEST = 2000
@@ -16,5 +17,9 @@ def address_problem(text: str) -> str:
     if problem := character_problem(text):
         return problem
     if len(text) > LONGEST:
-        return f"wanted at most {LONGEST} characters, got {len(text)}"
-    return "" if _ADDRESS.fullmatch(text) else f"wanted a web address (https://…), got {text[:40]!r}"
+        return message("wanted at most {most} characters, got {length}", most=LONGEST, length=len(text))
+    return (
+        ""
+        if _ADDRESS.fullmatch(text)
+        else message("wanted a web address (https://…), got {got}", got=repr(text[:40]))
+    )

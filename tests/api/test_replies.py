@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from silo import spoken
 from silo.api.foreign import Where
 from silo.api.replies import Reply, WebPageError, complaint, error_of
 from silo.api.wire import BomLine, Item
@@ -28,6 +29,7 @@ from silo.bom.errors import (
     UnreachableError,
     VersionConflictError,
 )
+from silo.bom.message import beside, message
 
 WHERE = Where("silo.example.com", "item F01-0001")
 
@@ -111,6 +113,40 @@ def test_all_problems_are_kept() -> None:
     theirs = error_of(reply(422, {"detail": detail}))
     assert isinstance(theirs, RejectedError)
     assert theirs.problems == ("entries.0.quantity: wanted a number",)
+
+
+def test_a_servers_sentence_keeps_its_values() -> None:
+    """It is shown in the user's language; a value that looks like a sentence of ours stays as it is."""
+    sent = message("item {part_number} is archived", part_number="3 lines")
+    body = {"error": "not_found", "message": sent, **beside(sent)}
+    error = error_of(reply(404, body))
+    assert "item 3 lines is archived" in str(error)
+    assert "Artikel 3 lines ist archiviert" in spoken(str(error), "de")
+    problems = [
+        message("quantity: {problem}", problem=message("wanted a number, got {got}", got="removed")),
+        "x",
+    ]
+    body = {"error": "rejected", "message": "x", "problems": problems}
+    told = {"problem_messages": [beside(problem) for problem in problems]}
+    rejected = error_of(reply(400, body | told))
+    assert isinstance(rejected, RejectedError)
+    assert [getattr(text, "template", "") for text in rejected.problems] == ["quantity: {problem}", ""]
+
+
+@pytest.mark.parametrize(
+    "told",
+    [
+        {},
+        {"template": "item {part_number} is archived", "values": {"part_number": "another"}},
+        {"template": "item {part_number} is archived", "values": {}},
+        {"template": ["item"], "values": 3},
+    ],
+)
+def test_a_sentence_that_its_values_do_not_make_stays(told: dict[str, Any]) -> None:
+    """An older server sends none; what a proxy changed is not believed."""
+    error = error_of(reply(404, {"error": "not_found", "message": "item P1 is archived", **told}))
+    assert spoken(str(error), "de").endswith(spoken(": item P1 is archived", "de"))
+    assert "another" not in str(error)
 
 
 def test_a_ring_keeps_its_way() -> None:

@@ -40,7 +40,7 @@ from silo.bom.errors import (
     VersionConflictError,
     duration,
 )
-from silo.bom.message import joined, message
+from silo.bom.message import from_json, joined, message
 from silo.bom.numbers import whole_number
 from silo.bounded_json import read_json
 from silo.budget import Budget, OverBudgetError
@@ -190,11 +190,11 @@ def complaint(reply: Reply) -> Complaint:
     error, message, detail = (body.get(key) for key in ("error", "message", "detail"))
     if isinstance(error, dict):  # {"error": {"code": …, "message": …}}
         message, error = message or error.get("message"), error.get("code")
-    problems = _texts(body.get("problems"), reply) or _texts(detail, reply)
+    problems = _problems(body, reply) or _texts(detail, reply)
     text = message or (detail if isinstance(detail, str) else "") or error or ""
     return Complaint(
         code=error if isinstance(error, str) and " " not in error else "",
-        text=_clean(text, reply.secret),
+        text=_with_values(_clean(text, reply.secret), body),
         problems=problems,
         path=_texts(body.get("path"), reply),
         revision=newer if isinstance(newer := body.get("revision"), dict) else None,
@@ -367,6 +367,21 @@ def _texts(value: Any, reply: Reply) -> tuple[str, ...]:
     if not isinstance(value, list):
         return ()
     return tuple(_clean(_problem(entry), reply.secret) for entry in value[:1000])
+
+
+def _problems(body: dict[str, Any], reply: Reply) -> tuple[str, ...]:
+    texts, told = _texts(body.get("problems"), reply), body.get("problem_messages")
+    if not isinstance(told, list) or len(told) < len(texts):
+        return texts
+    return tuple(_with_values(text, entry) for text, entry in zip(texts, told, strict=False))
+
+
+def _with_values(text: str, told: object) -> str:
+    """Return a sentence with the template and values that a server sends beside it, so that it can be shown
+    in the user's language; the sentence as it is, if they do not make it.
+    """
+    made = from_json(told)
+    return made if made is not None and made == text else text
 
 
 def _problem(entry: Any) -> Any:

@@ -514,11 +514,19 @@ class ErrorBody(Answer):
     """The one shape of every HTTP error. ``problems`` lists all bad entries at once, with their index.
 
     ``revision``: with the code ``newer_revision``, the one that the request does not know.
+
+    ``message`` is the English sentence. ``template``, ``plural`` and ``values`` make the same sentence,
+    also in another language; ``problem_messages`` has them for each entry of ``problems``, {} for a plain
+    sentence.
     """
 
     error: str
     message: str = ""
+    template: str | None = None
+    plural: str | None = None
+    values: dict[str, Any] | None = None
     problems: list[str] = Field(default_factory=list)
+    problem_messages: list[dict[str, Any]] = Field(default_factory=list)
     path: list[str] = Field(default_factory=list)
     revision: dict[str, Any] | None = None
 

@@ -23,7 +23,11 @@ from typing import Any, Protocol, Self
 _PLACE = re.compile(r"\{(\w+)\}")
 # Values that never hold a sentence of ours; all others may, until no plain sentence is left.
 _NAMES = frozenset(
-    ("file", "path", "part", "name", "names", "users", "obj", "target", "label", "document", "place")
+    (
+        *("file", "path", "part", "name", "names", "users", "obj", "target", "label", "document", "place"),
+        *("part_number", "part_numbers", "parent", "child", "supplier_part", "subject", "revision"),
+        *("user", "username", "got", "uuid", "checksum", "key", "sheets", "category"),
+    )
 )
 
 

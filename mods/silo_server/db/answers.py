@@ -17,6 +17,7 @@ from typing import Any
 from sqlalchemy import insert, select
 
 from silo.bom.errors import ConflictError
+from silo.bom.message import message
 from silo_server.db.tables import answers
 from silo_server.db.transaction import Tx
 
@@ -67,8 +68,12 @@ def earlier_answer(tx: Tx, request: KeyedRequest | None) -> KeptAnswer | None:
     if row.request_hash != request.hash:
         name = {"merge": "sync_id", "item": "id"}.get(request.subject.partition(" ")[0], "Idempotency-Key")
         raise ConflictError(
-            f"{name} {request.key!r} was used before for another request, which was carried out; send a new "
-            "one with new content"
+            message(
+                "{name} {key} was used before for another request, which was carried out; send a new one "
+                "with new content",
+                name=name,
+                key=repr(request.key),
+            )
         )
     return KeptAnswer(row.answer, row.version, row.change_id)
 

@@ -21,6 +21,7 @@ from typing import Any
 from sqlalchemy import delete, func, insert, select
 
 from silo.bom.errors import ReadOnlyError
+from silo.bom.message import message
 from silo_server.actors import SYSTEM, Actor
 from silo_server.db.engine import (
     READ_SECONDS,
@@ -86,8 +87,10 @@ class Database:
             tx = Tx(conn, actor, self.clock(), self.settings, self.clock)
             if not even_when_read_only and mode_of(tx) != "normal":
                 raise ReadOnlyError(
-                    "this server is read-only at the moment; nothing was changed, the same request may be "
-                    "sent again later"
+                    message(
+                        "this server is read-only at the moment; nothing was changed, the same request "
+                        "may be sent again later"
+                    )
                 )
             yield tx
             _flush_events(tx)

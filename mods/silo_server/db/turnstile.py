@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from silo.bom.errors import BusyError
+from silo.bom.message import message
 
 
 class Turnstile:
@@ -33,13 +34,21 @@ class Turnstile:
         """Wait for a place, and stay inside until the block ends. Raises BusyError; then nothing was done."""
         with self._lock:
             if self.full:
-                raise BusyError(f"too many {self._who} are waiting; nothing was changed, try again later")
+                raise BusyError(
+                    message(
+                        "too many {requests} are waiting; nothing was changed, try again later",
+                        requests=self._who,
+                    )
+                )
             self._here += 1
         try:
             if not self._free.acquire(timeout=self._seconds):
                 raise BusyError(
-                    f"other {self._who} took longer than {self._seconds:g} s; nothing was changed, "
-                    "try again later"
+                    message(
+                        "other {requests} took longer than {seconds} s; nothing was changed, try again later",
+                        requests=self._who,
+                        seconds=f"{self._seconds:g}",
+                    )
                 )
             try:
                 self.check()
@@ -58,7 +67,7 @@ class Turnstile:
     def check(self) -> None:
         """Raise BusyError if the server is stopping."""
         if self._closed:
-            raise BusyError("the server is stopping; try again later")
+            raise BusyError(message("the server is stopping; try again later"))
 
     @property
     def here(self) -> int:

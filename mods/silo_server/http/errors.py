@@ -27,6 +27,7 @@ from silo.bom.errors import (
     RouteMissingError,
     SiloError,
 )
+from silo.bom.message import beside, message
 from silo_server.errors import InDoubtError, TooManyAttemptsError, cause_of
 from silo_server.http.request_log import info_of
 
@@ -65,10 +66,16 @@ def error_answer(
     revision: Mapping[str, Any] | None = None,
     headers: Mapping[str, str] | None = None,
 ) -> Response:
-    """Answer with an error in the one JSON shape; empty details are left out."""
-    body: dict[str, Any] = {"error": code, "message": message}
+    """Answer with an error in the one JSON shape; empty details are left out.
+
+    A sentence that is a message has its template and values beside it.
+    """
+    body: dict[str, Any] = {"error": code, "message": message, **beside(message)}
     if problems:
         body["problems"] = list(problems)
+        told = [beside(problem) for problem in problems]
+        if any(told):
+            body["problem_messages"] = told
     if path:
         body["path"] = list(path)
     if revision is not None:
@@ -99,7 +106,9 @@ async def _silo_error(request: Request, error: Exception) -> Response:
 async def _validation_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
     problems = [_problem(entry) for entry in error.errors()]
-    return error_answer(400, "rejected", f"the request is unusable: {problems[0]}", problems=problems)
+    return error_answer(
+        400, "rejected", message("the request is unusable: {problem}", problem=problems[0]), problems=problems
+    )
 
 
 def _problem(entry: Mapping[str, Any]) -> str:
@@ -120,38 +129,50 @@ async def _http_exception(request: Request, error: Exception) -> Response:
 
 async def _database_error(request: Request, error: Exception) -> Response:
     if isinstance(error, DataError):
-        return error_answer(400, "rejected", "a value cannot be stored: it is too long, too large or no text")
+        return error_answer(
+            400, "rejected", message("a value cannot be stored: it is too long, too large or no text")
+        )
     if isinstance(error, IntegrityError):
-        return error_answer(409, "conflict", "somebody else changed the same thing just now; read it again")
+        return error_answer(
+            409, "conflict", message("somebody else changed the same thing just now; read it again")
+        )
     is_lost = getattr(error, "connection_invalidated", False)  # such as one that was idle for too long
     if is_lost or isinstance(error, OperationalError | PoolTimeoutError):
         logger.error("request %s: the database: %s", info_of(request.scope).id, cause_of(error))
         if request.method not in ("GET", "HEAD") and is_lost:
             # The commit may have come through before the connection was lost; Retry-After would deny that.
             doubt = InDoubtError(
-                "the connection to the database was lost; the change may be stored or not. Read it again "
-                "before you send it once more"
+                message(
+                    "the connection to the database was lost; the change may be stored or not. Read it again "
+                    "before you send it once more"
+                )
             )
             return await _silo_error(request, doubt)
-        busy = BusyError("the database cannot be reached at the moment; nothing was changed, try again later")
+        busy = BusyError(
+            message("the database cannot be reached at the moment; nothing was changed, try again later")
+        )
         full = _NO_SPACE.search(cause_of(error)) is not None
         return await _silo_error(request, _FULL if full else busy)
     return await _fault(request, error)
 
 
 async def _unicode_error(request: Request, error: Exception) -> Response:
-    return error_answer(400, "rejected", "a text in the request is no valid Unicode (a lone surrogate)")
+    return error_answer(
+        400, "rejected", message("a text in the request is no valid Unicode (a lone surrogate)")
+    )
 
 
 async def _fault(request: Request, error: Exception) -> Response:
     number = info_of(request.scope).id
     logger.error("request %s: %s %s failed", number, request.method, request.url.path, exc_info=error)
     return error_answer(
-        500, "server_fault", f"the server made a mistake; its log says more about the request {number}"
+        500,
+        "server_fault",
+        message("the server made a mistake; its log says more about the request {request}", request=number),
     )
 
 
-_FULL = BusyError("the server's disk is full; nothing was changed. Make room on it, then try again")
+_FULL = BusyError(message("the server's disk is full; nothing was changed. Make room on it, then try again"))
 # SQLite's words, and PostgreSQL's.
 _NO_SPACE = re.compile("disk is full|No space left", re.IGNORECASE)
 
@@ -159,11 +180,13 @@ _NO_SPACE = re.compile("disk is full|No space left", re.IGNORECASE)
 async def _disk_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, OSError)
     logger.error("request %s: the disk: %s", info_of(request.scope).id, error)
-    busy = BusyError("a file cannot be written or read at the moment; nothing was changed, try again later")
+    busy = BusyError(
+        message("a file cannot be written or read at the moment; nothing was changed, try again later")
+    )
     return await _silo_error(request, _FULL if error.errno in (errno.ENOSPC, errno.EDQUOT) else busy)
 
 
 async def _disconnected(request: Request, error: Exception) -> Response:
     # This answer is not read; the request was never whole, so nothing was done.
     logger.info("request %s: the client went away in the middle of its body", info_of(request.scope).id)
-    return error_answer(400, "rejected", "the request's body ended too soon")
+    return error_answer(400, "rejected", message("the request's body ended too soon"))

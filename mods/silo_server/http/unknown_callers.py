@@ -20,6 +20,7 @@ from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from silo.bom.errors import AuthError, BusyError, SiloError
+from silo.bom.message import message
 from silo.budget import KIB
 from silo_server.http.errors import answer_of
 
@@ -70,7 +71,9 @@ class UnknownCallers:
             return
         address = request.client.host if request.client else ""
         if self._under_way[address] >= MOST_FOR_AN_ADDRESS:
-            busy = BusyError("too many requests without a login come from this address; try again later")
+            busy = BusyError(
+                message("too many requests without a login come from this address; try again later")
+            )
             await (await answer_of(request, busy))(scope, receive, send)
             return
         self._under_way[address] += 1

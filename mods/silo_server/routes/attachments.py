@@ -13,6 +13,7 @@ from starlette.responses import Response
 
 from silo.api import wire
 from silo.bom.errors import RejectedError
+from silo.bom.message import message
 from silo.file_kind import ATTACHMENT_KINDS
 from silo_server.fields import to_wire
 from silo_server.routes import openapi
@@ -76,12 +77,14 @@ async def attach(call: Editor, part_number: str) -> Response:
     async with call.request.form(max_files=1, max_fields=20) as form:
         twice = [name for name in _FORM if len(form.getlist(name)) > 1]
         if twice:
-            raise RejectedError(f"{', '.join(twice)}: wanted one part of this name, got several")
+            raise RejectedError(
+                message("{parts}: wanted one part of this name, got several", parts=", ".join(twice))
+            )
         file, kind, comment = form.get("file"), form.get("kind") or "", form.get("comment") or ""
         if not isinstance(file, UploadFile):
-            raise RejectedError("file: wanted a multipart form with the file in a part named 'file'")
+            raise RejectedError(message("file: wanted a multipart form with the file in a part named 'file'"))
         if problem := text_problem(comment, 10_000) or text_problem(kind, 200):
-            raise RejectedError(f"comment, kind: {problem}")
+            raise RejectedError(message("comment, kind: {problem}", problem=problem))
         sha256 = sha256_or_none("sha256", form.get("sha256"))
 
         def work() -> Response:

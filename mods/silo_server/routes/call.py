@@ -12,6 +12,7 @@ import anyio.to_thread
 from fastapi import Depends, Request
 
 from silo.bom.errors import AuthError, ForbiddenError
+from silo.bom.message import message
 from silo_server.actors import Actor, Role
 from silo_server.db.database import Database
 from silo_server.db.transaction import Tx
@@ -87,7 +88,12 @@ class Guard:
             raise AuthError(NEEDS_TOKEN)
         if not actor.role.covers(self.role):
             raise ForbiddenError(
-                f"{actor.username} is {actor.role}, this needs {self.role}; an admin can change that"
+                message(
+                    "{username} is {role}, this needs {needed}; an admin can change that",
+                    username=actor.username,
+                    role=actor.role,
+                    needed=self.role,
+                )
             )
         if actor.auth_source == "session" and request.method not in SAFE_METHODS:
             await _check_csrf(request, actor)
@@ -129,4 +135,4 @@ async def _check_csrf(request: Request, actor: Actor) -> None:
         sent = (await form_of(request)).get("csrf_token")
     wanted = actor.csrf_token or ""
     if not isinstance(sent, str) or not secrets.compare_digest(unmasked(sent), wanted.encode()):
-        raise FormSecretError("the form's secret is missing or old; load the page again and repeat")
+        raise FormSecretError(message("the form's secret is missing or old; load the page again and repeat"))

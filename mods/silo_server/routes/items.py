@@ -22,6 +22,7 @@ from silo.api import wire
 from silo.api.wire import FactSource, HeldItem, ItemTexts, LinkedFile
 from silo.bom.errors import NotFoundError, RejectedError
 from silo.bom.items.part_address import part_segment
+from silo.bom.message import message
 from silo.bom.numbers import whole_number
 from silo.file_kind import ATTACHMENT_KINDS, MODEL
 from silo_server.db.answers import KeptAnswer, KeyedRequest, earlier_answer, keep_answer
@@ -211,7 +212,7 @@ async def patch_properties(
     """
     patch = await json_body(call.request)
     if not isinstance(patch, dict):
-        raise RejectedError("body: wanted a JSON object with the properties to change")
+        raise RejectedError(message("body: wanted a JSON object with the properties to change"))
 
     def work() -> Response:
         with call.write() as tx:
@@ -427,15 +428,19 @@ async def receive(call: Call, find: Find) -> Response:
     async with call.request.form(max_files=1, max_fields=20, max_part_size=_MAX_FIELD) as form:
         twice = [name for name in _FORM if len(form.getlist(name)) > 1]
         if twice:
-            raise RejectedError(f"{', '.join(twice)}: wanted one part of this name, got several")
+            raise RejectedError(
+                message("{parts}: wanted one part of this name, got several", parts=", ".join(twice))
+            )
         file, comment, raw = form.get("file"), form.get("comment"), form.get("properties")
         if not isinstance(file, UploadFile):
-            raise RejectedError("file: wanted a multipart form with the file in a part named 'file'")
+            raise RejectedError(message("file: wanted a multipart form with the file in a part named 'file'"))
         if problem := text_problem(comment or "", 10_000) or text_problem(raw or "", _MAX_FIELD):
-            raise RejectedError(f"comment, properties: {problem}")
+            raise RejectedError(message("comment, properties: {problem}", problem=problem))
         kind = form.get("kind") or ""
         if kind not in ("", MODEL, *ATTACHMENT_KINDS):
-            raise RejectedError(f"kind: wanted {MODEL} or {' or '.join(ATTACHMENT_KINDS)}")
+            raise RejectedError(
+                message("kind: wanted {model} or {kinds}", model=MODEL, kinds=" or ".join(ATTACHMENT_KINDS))
+            )
         sha256 = sha256_or_none("sha256", form.get("sha256"))
         properties = _properties(raw if isinstance(raw, str) else None)
         origin = RevisionOrigin(
@@ -484,7 +489,7 @@ def thumbnail(call: Viewer, part_number: str, key: Annotated[str, Query(max_leng
     with call.read() as tx:
         item = items.get_item(tx, part_number)
     if not item.thumbnail_key:
-        raise NotFoundError(f"item {item.part_number} has no thumbnail")
+        raise NotFoundError(message("item {part_number} has no thumbnail", part_number=item.part_number))
     path = call.server.files.path_of(item.thumbnail_key)
     kept = "max-age=31536000, immutable" if key and item.thumbnail_key.startswith(key) else "max-age=300"
     return FileResponse(path, media_type="image/png", headers={"Cache-Control": f"private, {kept}"})
@@ -550,7 +555,7 @@ def store_file(
             return answer(tx, of, revisions.get_revision(tx, of, int(number)))
         attached = _attached(tx, of, stored, kind, comment)
         if properties and (attached or isinstance(of, Document)):
-            raise RejectedError("properties: only the model of an item has any")
+            raise RejectedError(message("properties: only the model of an item has any"))
         if attached is not None:
             revision = revisions.get_revision(tx, attached, attached.current_revision)
             keep_answer(tx, request, KeptAnswer(f"{revision.revision_number} {attached.uuid}"))
@@ -568,7 +573,7 @@ def _former(raw: object) -> str:
     if raw is None or raw == "":
         return ""
     if not isinstance(raw, str):
-        raise RejectedError("former: wanted the UUID of a document")
+        raise RejectedError(message("former: wanted the UUID of a document"))
     return items.normal_uuid(raw)
 
 
@@ -587,7 +592,11 @@ def checked_hash(stored: StoredFile, sha256: str) -> None:
     """Raise RejectedError if another content arrived than ``sha256`` ("": any) says was sent."""
     if sha256 and stored.checksum != sha256:
         raise RejectedError(
-            f"sha256: the file arrived as {stored.checksum}, and {sha256} was sent; no revision was made"
+            message(
+                "sha256: the file arrived as {arrived}, and {sent} was sent; no revision was made",
+                arrived=stored.checksum,
+                sent=sha256,
+            )
         )
 
 
@@ -596,7 +605,9 @@ def _base_revision(raw: object) -> int | None:
         return None
     number = whole_number(raw, 7) if isinstance(raw, str) else None
     if number is None or number > 1_000_000:
-        raise RejectedError("base_revision: wanted the number of a revision, or 0 where there was none")
+        raise RejectedError(
+            message("base_revision: wanted the number of a revision, or 0 where there was none")
+        )
     return number
 
 
@@ -604,7 +615,7 @@ def _path(raw: object) -> str | None:
     if raw is None or raw == "":
         return None
     if problem := text_problem(raw, 1000):
-        raise RejectedError(f"path: {problem}")
+        raise RejectedError(message("path: {problem}", problem=problem))
     return str(raw)
 
 
@@ -616,7 +627,14 @@ def _list(name: str, kind: TypeAdapter[Any], raw: object) -> list[dict[str, str]
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = ".".join(map(str, first["loc"]))
-        raise RejectedError(f"{name}: wanted a JSON list as text; {where}: {first['msg']}") from None
+        raise RejectedError(
+            message(
+                "{field}: wanted a JSON list as text; {place}: {problem}",
+                field=name,
+                place=where,
+                problem=first["msg"],
+            )
+        ) from None
     entries: list[dict[str, str]] = [value.model_dump(exclude_defaults=True) for value in values]
     for text in (text for value in entries for text in value.values()):
         if problem := text_problem(text, 1000):
@@ -632,7 +650,7 @@ def _properties(raw: str | None) -> dict[str, Any] | None:
     except (ValueError, RecursionError):
         value = None
     if not isinstance(value, dict):
-        raise RejectedError("properties: wanted a JSON object as text")
+        raise RejectedError(message("properties: wanted a JSON object as text"))
     return value
 
 
@@ -642,7 +660,7 @@ def _download(call: Call, find: Find, number: int | None = None) -> Response:
         of = find(tx, False)
         revision = revisions.newest_file(tx, of) if number is None else revisions.get_revision(tx, of, number)
     if revision.file_checksum is None or revision.file_name is None:
-        raise NotFoundError(f"revision {revision.revision_number} has no file")
+        raise NotFoundError(message("revision {revision} has no file", revision=revision.revision_number))
     etag = f'"{revision.file_checksum}"'
     headers = {**DOWNLOAD_HEADERS, "ETag": etag}
     if call.request.headers.get("if-none-match") == etag:
@@ -717,7 +735,7 @@ def told_of(tx: Tx, uuid: str) -> dict[str, Any]:
     document = documents.get_document(tx, items.normal_uuid(uuid))
     now = shown(tx, [document])
     if not now:
-        raise NotFoundError(f"{document.subject} has no file yet")
+        raise NotFoundError(message("{subject} has no file yet", subject=document.subject))
     newest = revisions.get_revision(tx, document, document.current_revision)
     near = {"linked": linked_from(tx, document), "used_by": linking_to(tx, document)}
     others = {

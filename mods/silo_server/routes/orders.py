@@ -15,6 +15,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema
 from starlette.responses import Response
 
 from silo.bom.errors import RejectedError
+from silo.bom.message import message
 from silo.bom.numbers import LONGEST, read_number
 from silo.bom.quantities import as_decimal, decimal_text
 from silo.tables.price_rows import PRICES, PriceRows
@@ -236,8 +237,12 @@ def asked_of(
     """Read what an order list is for; ``spares`` in percent, ``rest``: without what was already ordered."""
     reading = read_number(spares or "0")
     if reading.value is None or not 0 <= reading.value <= orders.MOST_SPARES:
-        problem = reading.problem or f"wanted 0 to {orders.MOST_SPARES} percent, got {spares}"
-        raise RejectedError(f"spares: {problem}", [f"spares: {problem}"])
+        problem = reading.problem or message(
+            "wanted 0 to {most} percent, got {got}", most=orders.MOST_SPARES, got=spares
+        )
+        raise RejectedError(
+            message("spares: {problem}", problem=problem), [message("spares: {problem}", problem=problem)]
+        )
     return OrderRequest(pieces, reading.value, release, rest)
 
 

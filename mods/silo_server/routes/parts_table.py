@@ -12,6 +12,7 @@ import anyio.to_thread
 from fastapi import APIRouter, Query
 from starlette.responses import Response
 
+from silo.bom.message import message
 from silo_server.routes.answers import READ_ERRORS, WRITE_ERRORS, json_answer
 from silo_server.routes.bom.imports import IMPORT_BODY, uploaded
 from silo_server.routes.call import Admin, Editor, Viewer
@@ -64,7 +65,11 @@ async def import_items(
                     "dry_run": dry_run,
                     "import": done,
                     "counts": {status: counts[status] for status in STATUSES},
-                    "problems": [f"row {row.row}: {problem}" for row in plan for problem in row.problems],
+                    "problems": [
+                        message("row {row}: {problem}", row=row.row, problem=problem)
+                        for row in plan
+                        for problem in row.problems
+                    ],
                     "unused_columns": list(read.unused),
                     "notes": list(read.notes),
                     "rows": [_row_to_wire(row) for row in plan],

@@ -16,6 +16,7 @@ from starlette.types import Scope
 
 from silo.bom.errors import RejectedError
 from silo.bom.items.part_address import part_number_of
+from silo.bom.message import message
 from silo.bom.numbers import whole_number
 from silo.bounded_json import read_json
 from silo.budget import MIB, Budget, OverBudgetError
@@ -41,7 +42,9 @@ async def json_body(request: Request) -> Any:
         try:
             return read_json(body, BODY, "body", _no_constant)
         except ValueError as error:
-            raise RejectedError(f"body: wanted JSON, got something else ({error})") from None
+            raise RejectedError(
+                message("body: wanted JSON, got something else ({problem})", problem=error)
+            ) from None
 
     return await anyio.to_thread.run_sync(parse)
 

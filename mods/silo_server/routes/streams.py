@@ -11,6 +11,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from starlette.responses import Response
 
 from silo.bom.errors import RejectedError
+from silo.bom.message import message
 from silo_server.events import log
 from silo_server.events.stream import EventResponse
 from silo_server.routes.answers import READ_ERRORS
@@ -54,5 +55,7 @@ def _event_id(text: str | None) -> log.EventMark | None:
         return None
     match = EVENT_ID.fullmatch(text)
     if match is None:
-        raise RejectedError(f"Last-Event-ID: wanted the id of an event (a number), got {text[:40]!r}")
+        raise RejectedError(
+            message("Last-Event-ID: wanted the id of an event (a number), got {got}", got=repr(text[:40]))
+        )
     return log.EventMark(int(match["number"]), match["tag"] or "")

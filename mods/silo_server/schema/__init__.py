@@ -19,6 +19,7 @@ from pydantic.fields import FieldInfo
 from silo.api.wire import ItemTexts
 from silo.bom.errors import ConfigError, InputError, NotFoundError, RejectedError
 from silo.bom.items.schema import CategoryRule
+from silo.bom.message import message
 from silo.bom.numbers import read_number
 from silo.bom.quantities import plain
 from silo.bom.system_refusals import why_refused
@@ -82,7 +83,14 @@ class PropertyField:
         if self.type in ("number", "integer"):
             return self._number(text)
         if self.options and text not in self.options:
-            raise RejectedError(f"{self.label}: wanted one of {', '.join(self.options)}, got {text!r}")
+            raise RejectedError(
+                message(
+                    "{label}: wanted one of {known}, got {got}",
+                    label=self.label,
+                    known=", ".join(self.options),
+                    got=repr(text),
+                )
+            )
         if self.pattern and not re.fullmatch(self.pattern, text):
             example = f" such as {self.example}" if self.example else ""
             raise RejectedError(f"{self.label}: wanted a value{example}, got {text!r}")
@@ -96,7 +104,9 @@ class PropertyField:
             raise RejectedError(f"{self.title}: {reading.problem}")
         value = plain(reading.value)
         if self.type == "integer" and not isinstance(value, int):
-            raise RejectedError(f"{self.title}: wanted a whole number, got {text!r}")
+            raise RejectedError(
+                message("{label}: wanted a whole number, got {got}", label=self.title, got=repr(text))
+            )
         low, high = self.minimum, self.maximum
         if (low is not None and value < low) or (high is not None and value > high):
             ends = [
@@ -147,10 +157,15 @@ class Schema:
         found = self.categories.get(code.strip().upper())
         if found is None:
             raise RejectedError(
-                f"category: wanted a category of schema {self.name} (such as "
-                f"{', '.join([*self.categories][:3]) if self.name != DEFAULT_SCHEMA else 'A01, F01, M01'}), "
-                f"got {code!r}; "
-                f"GET /api/schemas/{self.name} lists them"
+                message(
+                    "category: wanted a category of schema {name} (such as {examples}), got {got}; GET "
+                    "/api/schemas/{name} lists them",
+                    name=self.name,
+                    examples=", ".join([*self.categories][:3])
+                    if self.name != DEFAULT_SCHEMA
+                    else "A01, F01, M01",
+                    got=repr(code),
+                )
             )
         return found
 
@@ -168,7 +183,13 @@ def find_schema(name: str | None) -> Schema:
     wanted = name or DEFAULT_SCHEMA
     schema = schemas().get(wanted)
     if schema is None:
-        raise NotFoundError(f"schema: there is no {wanted!r}; known are {', '.join(schemas())}")
+        raise NotFoundError(
+            message(
+                "schema: there is no {schema}; known are {known}",
+                schema=repr(wanted),
+                known=", ".join(schemas()),
+            )
+        )
     return schema
 
 

@@ -17,6 +17,7 @@ from uuid import uuid4
 from sqlalchemy import select, update
 
 from silo.bom.errors import NotFoundError, RejectedError
+from silo.bom.message import message
 from silo.file_kind import ATTACHMENT_KINDS, MODEL
 from silo_server.db.rows import one_of
 from silo_server.db.tables import documents, items, revisions
@@ -83,10 +84,17 @@ def attach(
     kind = kind or _usual_kind(item, file)
     if kind not in ATTACHMENT_KINDS:
         raise RejectedError(
-            f"kind: wanted {' or '.join(ATTACHMENT_KINDS)}, got {kind[:40]!r}; a model goes to "
-            "/api/items/{part_number}/file"
+            message(
+                "kind: wanted {kinds}, got {kind}; a model goes to /api/items/{part_number}/file",
+                kinds=" or ".join(ATTACHMENT_KINDS),
+                kind=repr(kind[:40]),
+            )
             if kind != MODEL
-            else f"{file.name} is a model; send it as the file of {item.part_number}, or name another kind"
+            else message(
+                "{file} is a model; send it as the file of {part_number}, or name another kind",
+                file=file.name,
+                part_number=item.part_number,
+            )
         )
     same_name = (
         other
@@ -106,7 +114,13 @@ def revise(tx: Tx, document: Document, file: StoredFile, comment: str = "") -> t
     """Add a revision to an attachment, and return it and whether there is a new one."""
     item = item_of(tx, document)
     if document.removed_at is not None:
-        raise NotFoundError(f"the attachment {document.uuid} of {item.part_number} was removed")
+        raise NotFoundError(
+            message(
+                "the attachment {uuid} of {part_number} was removed",
+                uuid=document.uuid,
+                part_number=item.part_number,
+            )
+        )
     before = _find(tx, document)
     if before is not None and (before.file_checksum, before.file_name) == (file.checksum, file.name):
         return before, False
@@ -121,7 +135,11 @@ def revise(tx: Tx, document: Document, file: StoredFile, comment: str = "") -> t
 def change_kind(tx: Tx, uuid: str, kind: str) -> Attachment:
     """Give an attachment another kind. Raises NotFoundError, RejectedError."""
     if kind not in ATTACHMENT_KINDS:
-        raise RejectedError(f"kind: wanted {' or '.join(ATTACHMENT_KINDS)}, got {kind[:40]!r}")
+        raise RejectedError(
+            message(
+                "kind: wanted {kinds}, got {kind}", kinds=" or ".join(ATTACHMENT_KINDS), kind=repr(kind[:40])
+            )
+        )
     item, document = _locked(tx, uuid)
     tx.conn.execute(update(documents).where(documents.c.id == document.id).values(kind=kind))
     tx.conn.execute(update(revisions).where(revisions.c.document_id == document.id).values(kind=kind))
@@ -153,11 +171,15 @@ def _locked(tx: Tx, uuid: str) -> tuple[Item, Document]:
     """Lock the item of an attachment. Raises NotFoundError for any other document, and for a removed one."""
     document = find_document(tx, uuid)
     if document is None or document.attached_to is None:
-        raise NotFoundError(f"no attachment has the UUID {uuid}")
+        raise NotFoundError(message("no attachment has the UUID {uuid}", uuid=uuid))
     item = get_item(tx, item_of(tx, document).part_number, include_archived=True, lock=True)
     document = get_document(tx, uuid)
     if document.removed_at is not None:
-        raise NotFoundError(f"the attachment {uuid} of {item.part_number} was removed")
+        raise NotFoundError(
+            message(
+                "the attachment {uuid} of {part_number} was removed", uuid=uuid, part_number=item.part_number
+            )
+        )
     return item, document
 
 

@@ -17,6 +17,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, delete, insert, select, update
 
 from silo.bom.errors import NotFoundError
+from silo.bom.message import message
 from silo.file_kind import MODEL
 from silo_server.db.rows import insert_rows, one_of
 from silo_server.db.tables import document_items, document_links, documents, items, revisions
@@ -80,7 +81,7 @@ def get_document(tx: Tx, uuid: str) -> Document:
     """Find the document with this UUID. Raises NotFoundError."""
     document = find_document(tx, uuid)
     if document is None:
-        raise NotFoundError(f"no document has the UUID {uuid}")
+        raise NotFoundError(message("no document has the UUID {uuid}", uuid=uuid))
     return document
 
 

@@ -8,6 +8,7 @@ import io
 from sqlalchemy import update
 
 from silo.bom.errors import RejectedError
+from silo.bom.message import message
 from silo_server.db.tables import items
 from silo_server.db.transaction import Tx
 from silo_server.errors import DuplicateError
@@ -20,13 +21,23 @@ def keep_picture(tx: Tx, store: FileStore, item: Item, picture: bytes) -> None:
     """Store a PNG that a browser drew, for an item without a picture. RejectedError, DuplicateError."""
     size = png_size(picture)
     if len(picture) > MAX_DRAWN or not size:
-        raise RejectedError(f"picture: wanted a whole PNG of at most {MAX_DRAWN // 1024} KiB, got another")
+        raise RejectedError(
+            message("picture: wanted a whole PNG of at most {most} KiB, got another", most=MAX_DRAWN // 1024)
+        )
     if not 16 <= min(size) <= max(size) <= 512:
-        raise RejectedError(f"picture: wanted 16 to 512 pixels each way, got {size[0]} × {size[1]}")
+        raise RejectedError(
+            message(
+                "picture: wanted 16 to 512 pixels each way, got {width} × {height}",
+                width=size[0],
+                height=size[1],
+            )
+        )
     kept = store.keep("picture.png", io.BytesIO(picture)).checksum
     bare = (items.c.id == item.id) & items.c.thumbnail_key.is_(None)
     if not tx.conn.execute(update(items).where(bare).values(thumbnail_key=kept)).rowcount:
-        raise DuplicateError(f"{item.subject} has a picture already; a new file takes it away")
+        raise DuplicateError(
+            message("{subject} has a picture already; a new file takes it away", subject=item.subject)
+        )
 
 
 MAX_DRAWN = 256 * 1024

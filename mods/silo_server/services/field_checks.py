@@ -13,6 +13,7 @@ from decimal import Decimal
 from typing import Any
 
 from silo.bom.errors import RejectedError
+from silo.bom.message import message
 from silo.bom.quantities import LARGEST_QUANTITY, quantity_of
 from silo.bom.text import character_problem
 
@@ -20,7 +21,9 @@ from silo.bom.text import character_problem
 def text_problem(value: Any, longest: int) -> str | None:
     """Say what is wrong with a text of at most ``longest`` characters; None if nothing is."""
     if not isinstance(value, str) or len(value) > longest:
-        return f"wanted a text of at most {longest} characters, got {shortened(value)}"
+        return message(
+            "wanted a text of at most {most} characters, got {got}", most=longest, got=shortened(value)
+        )
     return character_problem(value)
 
 
@@ -30,19 +33,19 @@ def sha256_or_none(name: str, value: Any) -> str | None:
         return None
     if isinstance(value, str) and re.fullmatch("[0-9A-Fa-f]{64}", value):
         return value.lower()
-    raise RejectedError(f"{name}: wanted 64 hexadecimal digits")
+    raise RejectedError(message("{name}: wanted 64 hexadecimal digits", name=name))
 
 
 def quantity_problem(value: Any) -> str | None:
     """Say what is wrong with a quantity; None if nothing is."""
     if isinstance(value, bool) or not isinstance(value, int | float | Decimal):
-        return f"wanted a number, got {shortened(value)}"
+        return message("wanted a number, got {got}", got=shortened(value))
     # A huge integer has no float; comparing it is safe, converting it is not.
     if not 0 < value <= LARGEST_QUANTITY or not math.isfinite(value):
-        return f"wanted a number above 0 and at most 1e9, got {shortened(value)}"
+        return message("wanted a number above 0 and at most 1e9, got {got}", got=shortened(value))
     # It travels as a JSON number, which most readers take for a double.
     if isinstance(value, Decimal) and quantity_of(float(value)) != value:
-        return f"wanted a number of at most 15 digits, got {value:f}"
+        return message("wanted a number of at most 15 digits, got {got}", got=f"{value:f}")
     return None
 
 

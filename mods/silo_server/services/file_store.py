@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import IO
 
 from silo.bom.errors import NotFoundError
+from silo.bom.message import message
 from silo.file_kind import MODEL, kind_of
 from silo.platform.device_names import no_device_name
 from silo.platform.whole_files import remove_patiently, replace_patiently, sync_folder
@@ -48,7 +49,9 @@ class FileStore:
         """Return the path of the file with this hash; NotFoundError if it is not there."""
         path = self._place(checksum)
         if not path.is_file():
-            raise NotFoundError(f"the file with SHA-256 {checksum} is not in this server's store")
+            raise NotFoundError(
+                message("the file with SHA-256 {checksum} is not in this server's store", checksum=checksum)
+            )
         return path
 
     def keep(self, name: str, source: IO[bytes]) -> StoredFile:

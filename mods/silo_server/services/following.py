@@ -11,6 +11,7 @@ from typing import NamedTuple
 from sqlalchemy import delete, func, insert, or_, select
 
 from silo.bom.errors import RejectedError
+from silo.bom.message import message
 from silo_server.actors import Actor
 from silo_server.db.rows import one_of
 from silo_server.db.tables import bom_last_syncs, follows, items, product_looks
@@ -58,13 +59,18 @@ def follow(tx: Tx, target: str, *, on: bool) -> None:
     elif kind == "folder" and folder and len(folder) <= 1000:
         target = FOLDER + folder
     else:
-        raise RejectedError(f"target: wanted an item or a project folder, got {target[:80]!r}")
+        raise RejectedError(
+            message("target: wanted an item or a project folder, got {target}", target=repr(target[:80]))
+        )
     row, user_id = follows.c, tx.actor.own_id
     tx.conn.execute(delete(follows).where(row.user_id == user_id, row.target == target))
     count = tx.conn.scalar(select(func.count()).select_from(follows).where(row.user_id == user_id)) or 0
     if on and count >= MOST_FOLLOWED:
         raise RejectedError(
-            f"you can follow at most {MOST_FOLLOWED} items and folders; stop following some first"
+            message(
+                "you can follow at most {most} items and folders; stop following some first",
+                most=MOST_FOLLOWED,
+            )
         )
     if on:
         seen = {"seen": tx.stamp, "event": log.bounds(tx)[1]}

@@ -20,15 +20,23 @@ def read_import(data: bytes, kind: TableKind, max_rows: int, layout: Layout | No
     """Read a table. RejectedError if it is none of this kind, TooLargeError above ``max_rows``."""
     sheet = _read(data, kind, layout)
     if len(sheet.rows) > max_rows:
-        raise TooLargeError(f"file: this server takes at most {max_rows} rows, got more")
+        raise TooLargeError(message("file: this server takes at most {most} rows, got more", most=max_rows))
     if sheet.sheets:
         names = listed([f"“{name}”" for name in sheet.sheets])
-        raise RejectedError(f"file: the sheets {names} each hold such a table; save the right sheet alone")
-    for lines, words in ((sheet.hidden, "hidden"), (sheet.struck, "struck out")):
+        raise RejectedError(
+            message(
+                "file: the sheets {sheets} each hold such a table; save the right sheet alone", sheets=names
+            )
+        )
+    for lines, words in ((sheet.hidden, "hidden"), (sheet.struck, message("struck out"))):
         if lines:
             raise RejectedError(
-                f"file: these lines are {words}: {listed([str(line) for line in lines], 8)}; show or delete "
-                "them, for an import would take them like all others"
+                message(
+                    "file: these lines are {words}: {lines}; show or delete them, for an import would take "
+                    "them like all others",
+                    words=words,
+                    lines=listed([str(line) for line in lines], 8),
+                )
             )
     return sheet
 

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from sqlalchemy import func, select, update
 
 from silo.bom.errors import ConflictError, NotFoundError, listed
+from silo.bom.message import message
 from silo_server.db.rows import one_of
 from silo_server.db.tables import bom_changes, bom_lines, imports, items
 from silo_server.db.transaction import Tx
@@ -29,10 +30,16 @@ def undo_import(tx: Tx, import_id: int) -> Import:
     """Take an import back. NotFoundError; ConflictError names what was changed since, and changes nothing."""
     row = tx.conn.execute(select(imports).where(imports.c.id == import_id).with_for_update()).one_or_none()
     if row is None:
-        raise NotFoundError(f"there is no import {import_id}")
+        raise NotFoundError(message("there is no import {import_id}", import_id=import_id))
     found = from_row(Import, row)
     if found.undone_at:
-        raise ConflictError(f"import {import_id} was undone already, by {found.undone_by}")
+        raise ConflictError(
+            message(
+                "import {import_id} was undone already, by {username}",
+                import_id=import_id,
+                username=found.undone_by,
+            )
+        )
     said = json.loads(found.done)
     changed = {int(item_id): columns for item_id, columns in said["changed"].items()}
     ids = {*said["made"], *changed, *(i for i, _ in said["suppliers"]), *(i for i, _ in said["boms"])}
@@ -49,12 +56,18 @@ def undo_import(tx: Tx, import_id: int) -> Import:
         cells = cells_of(item)
         since = [column for column, (_, after) in columns.items() if cells[column] != after]
         if since:
-            problems.append(f"{item.part_number}: {', '.join(since)} changed since")
+            problems.append(
+                message(
+                    "{part_number}: {since} changed since",
+                    part_number=item.part_number,
+                    since=", ".join(since),
+                )
+            )
         elif not item.archived_at or "archived" in columns:
             restore_cells(tx, item, {column: before for column, (before, _) in columns.items()})
     problems += _archive_made(tx, [there[item_id] for item_id in said["made"]])
     if problems:
-        raise ConflictError(f"the import cannot be undone: {listed(problems, 5)}")
+        raise ConflictError(message("the import cannot be undone: {problems}", problems=listed(problems, 5)))
     undone = {"undone_at": tx.stamp, "undone_by": tx.actor.username}
     tx.conn.execute(update(imports).where(imports.c.id == import_id).values(undone))
     return found
@@ -89,4 +102,8 @@ def _archive_made(tx: Tx, made: Sequence[Item]) -> list[str]:
     for item in made:
         if not item.archived_at and item.id not in used:
             archive_item(tx, item.part_number)
-    return [f"{item.part_number} is in the BOM of {used[item.id]}" for item in made if item.id in used]
+    return [
+        message("{part_number} is in the BOM of {parent}", part_number=item.part_number, parent=used[item.id])
+        for item in made
+        if item.id in used
+    ]

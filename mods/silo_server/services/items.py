@@ -21,6 +21,7 @@ from sqlalchemy.exc import IntegrityError
 
 from silo.api.wire import FACTS, FactSource, ItemTexts, Stated
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError, VersionConflictError
+from silo.bom.message import Message, joined, message, template
 from silo.bom.text import REFUSED_CHARACTERS, character_problem
 from silo.bom.units import stored_unit
 from silo.bom.walk.identity import as_uuid
@@ -55,17 +56,24 @@ _UNSEEN = re.compile(f"[{UNSEEN}]")
 def check_number(number: str) -> str:
     """Check and trim a part number; RejectedError if it cannot be seen whole, or stand in one line."""
     if problem := character_problem(number):
-        raise RejectedError(f"part_number: {problem}")
+        raise RejectedError(message("part_number: {problem}", problem=problem))
     trimmed = number.strip()
     unseen = sorted({f"U+{ord(c):04X}" for c in _UNSEEN.findall(trimmed)})
     if unseen:
         raise RejectedError(
-            f"part_number: wanted characters that can be seen, got {', '.join(unseen)} in {number!a}; "
-            "type the number by hand instead of pasting it"
+            message(
+                "part_number: wanted characters that can be seen, got {characters} in {number}; type the "
+                "number by hand instead of pasting it",
+                characters=", ".join(unseen),
+                number=ascii(number),
+            )
         )
     if not NUMBER_FORM.fullmatch(trimmed):
         raise RejectedError(
-            f"part_number: wanted 1 to 64 characters in one line, without tabs, got {number[:80]!r}"
+            message(
+                "part_number: wanted 1 to 64 characters in one line, without tabs, got {got}",
+                got=repr(number[:80]),
+            )
         )
     return trimmed
 
@@ -192,13 +200,15 @@ def get_item(tx: Tx, part_number: str, *, include_archived: bool = False, lock: 
     is then later than that of the item's last change.
     """
     if problem := character_problem(part_number):
-        raise NotFoundError(f"no item has this part number: {problem}")
+        raise NotFoundError(message("no item has this part number: {problem}", problem=problem))
     query = select(items).where(items.c.part_number_key == part_number.casefold())
     row = tx.conn.execute(query.with_for_update(key_share=True) if lock else query).one_or_none()
     if row is None or (row.archived_at and not include_archived):
         if row is None:
-            raise NotFoundError(f"item {part_number!r} does not exist on this server")
-        raise NotFoundError(f"item {part_number!r} is archived")
+            raise NotFoundError(
+                message("item {part_number} does not exist on this server", part_number=repr(part_number))
+            )
+        raise NotFoundError(message("item {part_number} is archived", part_number=repr(part_number)))
     if lock:
         tx.take_time(row.updated_at)
     return to_item(row)
@@ -208,7 +218,7 @@ def get_by_uuid(tx: Tx, uuid: str) -> Item:
     """Find the item with this UUID; NotFoundError if there is none or it is archived."""
     row = tx.conn.execute(select(items).where(items.c.uuid == normal_uuid(uuid))).one_or_none()
     if row is None or row.archived_at:
-        raise NotFoundError(f"no item has the UUID {uuid}")
+        raise NotFoundError(message("no item has the UUID {uuid}", uuid=uuid))
     return to_item(row)
 
 
@@ -276,7 +286,7 @@ def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
     number = check_number(new.part_number) if new.part_number else None
     if number is None and category is None:
         raise RejectedError(
-            "category: wanted a category (such as F01) or an explicit part_number, got neither"
+            message("category: wanted a category (such as F01) or an explicit part_number, got neither")
         )
     check_json("properties", new.properties)
     uuid = normal_uuid(new.uuid, "id") if new.uuid is not None else None
@@ -287,9 +297,14 @@ def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
     if (earlier := earlier_answer(tx, request)) is not None:
         return _made_before(tx, earlier.text), False
     if uuid is not None and (others := get_by_uuids(tx, [uuid], include_archived=True)):
-        state = ", which is archived" if others[0].archived_at else ""
+        state = message(", which is archived") if others[0].archived_at else ""
         raise ConflictError(
-            f"id: {uuid} is that of {others[0].part_number}{state}; a new item needs a new id"
+            message(
+                "id: {uuid} is that of {part_number}{state}; a new item needs a new id",
+                uuid=uuid,
+                part_number=others[0].part_number,
+                state=state,
+            )
         )
     if number is None and category is not None:
         number = take_number(tx, schema, category)
@@ -379,7 +394,9 @@ def change_item(tx: Tx, part_number: str, change: ItemChange, expected: int | No
             )
         )
     except IntegrityError as error:
-        raise DuplicateError(f"part number {number} is taken by another item") from error
+        raise DuplicateError(
+            message("part number {part_number} is taken by another item", part_number=number)
+        ) from error
     index_item(tx, item.id)
     after = get_item(tx, number)
     announce.item_updated(tx, after)
@@ -391,7 +408,12 @@ def _kept_from_cad(item: Item) -> list[str]:
     return [n for n in FACTS if n in item.properties and item.origins.get(n, {}).get("source") != "cad"]
 
 
-_FACT_WORDS = {"mass_kg": "mass", "size_m": "size", "volume_m3": "volume", "com_m": "centre of mass"}
+_FACT_WORDS = {
+    "mass_kg": "mass",
+    "size_m": "size",
+    "volume_m3": "volume",
+    "com_m": template("centre of mass"),
+}
 
 
 def fill_in(tx: Tx, part_number: str, stated: Stated, checksum: str) -> None:
@@ -417,8 +439,10 @@ def fill_in(tx: Tx, part_number: str, stated: Stated, checksum: str) -> None:
     given = [n for n in FACTS if properties.get(n) != item.properties.get(n)] + [*changed]
     if given:
         revisions.complete(tx, item, checksum, properties, changed)
-        words = ", ".join(_FACT_WORDS.get(name, name) for name in given)
-        announce.item_updated(tx, get_item(tx, part_number), f"{words} taken from its file")
+        words = joined(", ", [Message(_FACT_WORDS.get(name, name)) for name in given])
+        announce.item_updated(
+            tx, get_item(tx, part_number), message("{fields} taken from its file", fields=words)
+        )
 
 
 def _about_same(value: Any, other: Any) -> bool:
@@ -433,8 +457,13 @@ def check_item_version(item: Item, expected: int | None) -> None:
     """Raise VersionConflictError unless the item still has the version that the request was made from."""
     if expected is not None and expected != item.version:
         raise VersionConflictError(
-            f"item {item.part_number} has version {item.version}, the request was made from version "
-            f"{expected}; read it again and repeat"
+            message(
+                "item {part_number} has version {version}, the request was made from version {expected}; "
+                "read it again and repeat",
+                part_number=item.part_number,
+                version=item.version,
+                expected=expected,
+            )
         )
 
 
@@ -470,7 +499,7 @@ def unarchive_item(tx: Tx, part_number: str) -> Item:
         tx.conn.execute(
             update(items).where(items.c.id == item.id).values(archived_at=None, version=items.c.version + 1)
         )
-        announce.item_updated(tx, item, "brought back")
+        announce.item_updated(tx, item, message("brought back"))
     return get_item(tx, part_number)
 
 
@@ -479,7 +508,11 @@ def normal_uuid(uuid: str, field: str = "uuid") -> str:
     normal = as_uuid(uuid)
     if not normal:
         raise RejectedError(
-            f"{field}: wanted a UUID such as 6f9619ff-8b86-4011-b42d-00cf4fc964ff, got {uuid!r}"
+            message(
+                "{field}: wanted a UUID such as 6f9619ff-8b86-4011-b42d-00cf4fc964ff, got {uuid}",
+                field=field,
+                uuid=repr(uuid),
+            )
         )
     return normal
 
@@ -489,8 +522,12 @@ def _made_before(tx: Tx, uuid: str) -> Item:
     (item,) = get_by_uuids(tx, [uuid], include_archived=True)
     if item.archived_at:
         raise ConflictError(
-            f"id: {item.uuid} is that of {item.part_number}, which is archived; bring it back, or give a new "
-            "item a new id"
+            message(
+                "id: {uuid} is that of {part_number}, which is archived; bring it back, or give a new item "
+                "a new id",
+                uuid=item.uuid,
+                part_number=item.part_number,
+            )
         )
     return item
 
@@ -508,7 +545,11 @@ def _insert(tx: Tx, number: str, values: Mapping[str, Any]) -> None:
         )
     except IntegrityError as error:
         raise DuplicateError(
-            f"part number {number} is taken; numbers that differ only in upper and lower case count as equal"
+            message(
+                "part number {part_number} is taken; numbers that differ only in upper and lower case "
+                "count as equal",
+                part_number=number,
+            )
         ) from error
 
 
@@ -516,7 +557,13 @@ def _item_type(given: str | None, category: Category | None) -> str:
     if given is None:
         return category.item_type if category else "part"
     if given not in ITEM_TYPES:
-        raise RejectedError(f"item_type: wanted one of {', '.join(ITEM_TYPES)}, got {given!r}")
+        raise RejectedError(
+            message(
+                "item_type: wanted one of {known}, got {item_type}",
+                known=", ".join(ITEM_TYPES),
+                item_type=repr(given),
+            )
+        )
     return given
 
 
@@ -524,9 +571,15 @@ def _stored_texts(texts: Mapping[str, str | None]) -> dict[str, str | None]:
     """Return texts as they are stored: a unit in its one form. RejectedError for what is no unit."""
     if (unit := texts.get("unit")) is None:
         return dict(texts)
-    if problem := character_problem(unit) or ("" if len(unit.strip()) <= LONGEST_UNIT else "it is too long"):
+    if problem := character_problem(unit) or (
+        "" if len(unit.strip()) <= LONGEST_UNIT else message("it is too long")
+    ):
         raise RejectedError(
-            f"unit: wanted a word such as m or kg, at most {LONGEST_UNIT} characters: {problem}"
+            message(
+                "unit: wanted a word such as m or kg, at most {most} characters: {problem}",
+                most=LONGEST_UNIT,
+                problem=problem,
+            )
         )
     return {**texts, "unit": stored_unit(unit) or ""}
 

@@ -20,6 +20,7 @@ from typing import NamedTuple
 from sqlalchemy import false, insert, or_, select, update
 
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError, counted, listed
+from silo.bom.message import Message, counted_message, joined, message
 from silo.bom.quantities import decimal_text, exact_product, exact_sum, plain
 from silo.bom.units import converted, unit_of
 from silo.file_kind import ATTACHMENT_KINDS, MODEL
@@ -139,19 +140,30 @@ class OrderRow(NamedTuple):
         """List what a purchaser must know about the part, in words."""
         remarks = list(self.doubts)
         if self.item.archived_at:
-            remarks.append("archived")
+            remarks.append(message("archived"))
         if self.kind == BOUGHT and self.offer is None:
-            remarks.append("no supplier")
+            remarks.append(message("no supplier"))
         elif self.offer is not None and self.needed:
             of = self.offer.of
             if self.offer.price is None:
                 least = of.prices[0][0] if of.prices else None
-                remarks.append("no price" if least is None else f"no price below {decimal_text(least)}")
+                remarks.append(
+                    message("no price")
+                    if least is None
+                    else message("no price below {least}", least=decimal_text(least))
+                )
             if self.offer.cheaper is not None:
                 more, cost = self.offer.cheaper
-                remarks.append(f"{decimal_text(more)} would cost less: {decimal_text(cost)} {of.currency}")
+                remarks.append(
+                    message(
+                        "{quantity} would cost less: {cost} {currency}",
+                        quantity=decimal_text(more),
+                        cost=decimal_text(cost),
+                        currency=of.currency,
+                    )
+                )
         if self.no_rate and self.needed:
-            remarks.append(f"no rate for {self.cost.currency}")
+            remarks.append(message("no rate for {currency}", currency=self.cost.currency))
         return remarks
 
 
@@ -249,7 +261,7 @@ def _row(
     no_rate = cost.currency is not None and cost.currency not in rates
     doubts = flat_row.doubts(asked.pieces)
     doubts += [
-        f"ordered in another unit: {decimal_text(amount)} {unit}"
+        message("ordered in another unit: {quantity} {unit}", quantity=decimal_text(amount), unit=unit)
         for (unit, amount), same in zip(ordered.items(), amounts, strict=True)
         if same is None
     ]
@@ -262,26 +274,49 @@ def _state(
 ) -> tuple[str, list[str]]:
     """Describe what the list is of, and what a reader must know first."""
     if release is not None:
-        state = f"Revision {release.label}, {release.status}, frozen at {wire_time(release.frozen_at)}"
-        warnings = (
+        state = message(
+            "Revision {label}, {status}, frozen at {frozen_at}",
+            label=release.label,
+            status=Message(release.status),
+            frozen_at=wire_time(release.frozen_at),
+        )
+        warnings: list[str] = (
             []
             if release.status == "released"
-            else [f"Revision {release.label} is {release.status}, not released"]
+            else [
+                message(
+                    "Revision {label} is {status}, not released",
+                    label=release.label,
+                    status=Message(release.status),
+                )
+            ]
         )
         if release.status == "released" and release.override:
-            warnings.append(f"Released in spite of what was open: {release.override}")
-        return state, warnings + [f"Open when it was frozen: {block}" for block in release.blocks[:20]]
+            warnings.append(message("Released in spite of what was open: {reason}", reason=release.override))
+        return state, warnings + [
+            message("Open when it was frozen: {problem}", problem=block) for block in release.blocks[:20]
+        ]
     assert summary is not None  # a draft has one
     newest = newest_release(tx, product)
-    instead = f"; revision {newest.label} is released" if newest else ""
-    warnings = [f"This is the draft, not a released revision{instead}"]
+    instead = message("; revision {label} is released", label=newest.label) if newest else ""
+    warnings = [message("This is the draft, not a released revision{instead}", instead=instead)]
     if summary.open:
-        lines = [f"{number}: {words}" for number, words in summary.open_boms()]
-        what = counted(summary.questions, "question") + " open, " if summary.questions else ""
-        warnings.append(f"{what}{counted(len(lines), 'BOM')} with something open: {listed(lines, 20)}")
+        lines = [
+            message("{part_number}: {words}", part_number=number, words=words)
+            for number, words in summary.open_boms()
+        ]
+        boms = message(
+            "{boms} with something open: {part_numbers}",
+            boms=counted(len(lines), "BOM"),
+            part_numbers=listed(lines, 20),
+        )
+        asked = counted_message(summary.questions, "{n} question open", "{n} questions open")
+        warnings.append(joined(", ", (asked, boms)) if summary.questions else boms)
     if not graph.lines:
-        warnings.append(f"{product.part_number} has no BOM, so there is nothing to order")
-    return "Draft", warnings
+        warnings.append(
+            message("{part_number} has no BOM, so there is nothing to order", part_number=product.part_number)
+        )
+    return message("Draft"), warnings
 
 
 def _summed(
@@ -398,7 +433,7 @@ def record(
     """Record what was ordered for a product. Returns as :func:`list_recorded`; RejectedError for nothing."""
     if not ordered:
         raise RejectedError(
-            "wanted at least one part with a quantity above 0, got none; nothing was recorded"
+            message("wanted at least one part with a quantity above 0, got none; nothing was recorded")
         )
     product = get_item(tx, part_number, include_archived=True)
     made = []
@@ -424,9 +459,17 @@ def take_back(tx: Tx, part_number: str, order_id: int) -> Recorded:
     """Record that an order was not placed after all; it stays in the list. NotFoundError, ConflictError."""
     recorded = list_recorded(tx, [order_id], get_item(tx, part_number, include_archived=True))
     if not recorded:
-        raise NotFoundError(f"there is no order {order_id} for {part_number}")
+        raise NotFoundError(
+            message("there is no order {order} for {part_number}", order=order_id, part_number=part_number)
+        )
     if recorded[0][0].ended_at:
-        raise ConflictError(f"order {order_id} was taken back at {recorded[0][0].ended_at[:16]} already")
+        raise ConflictError(
+            message(
+                "order {order} was taken back at {time} already",
+                order=order_id,
+                time=recorded[0][0].ended_at[:16],
+            )
+        )
     ended = {"ended_at": tx.stamp, "ended_by": tx.actor.username}
     tx.conn.execute(update(orders).where(orders.c.id == order_id).values(ended))
     audit.note(tx, "order.taken_back", recorded[0][1], f"order {order_id}")

@@ -19,6 +19,7 @@ from sqlalchemy import select
 
 from silo.bom.errors import InputError, RejectedError, listed
 from silo.bom.headers import Heading, safe_cell
+from silo.bom.message import joined, message
 from silo.bom.units import PIECES, stored_unit
 from silo.tables.part_rows import FACTS, PARTS, PartRow, PartRows, part_rows
 from silo.tables.sheet import Layout
@@ -132,7 +133,11 @@ class _Known:
         same = [item for item in free if not text or item.description in (text, name)] or free
         if len(same) > like:
             called = listed([item.part_number for item in same], 5)
-            return None, f"Part number: {name}: {called} are called so; give the part number"
+            return None, message(
+                "Part number: {name}: {part_numbers} are called so; give the part number",
+                name=name,
+                part_numbers=called,
+            )
         item = next(iter(same), None)
         if item is not None:
             self.claimed.add(item.id)
@@ -159,9 +164,13 @@ def plan_parts(tx: Tx, read: PartRows, allowed: PartsAllowed = PARTS_AS_THEY_ARE
         if not left_out and counts[number.casefold()] > 1:
             before = first.setdefault(number.casefold(), row)
             if before is not row and _says(before) == _says(row):
-                left_out = f"the same as row {before.line}"
+                left_out = message("the same as row {row}", row=before.line)
             elif before is not row and allowed.duplicates == "first":
-                left_out = f"row {before.line} has the number {number} too, and counts"
+                left_out = message(
+                    "row {row} has the number {part_number} too, and counts",
+                    row=before.line,
+                    part_number=number,
+                )
             elif before is not row and allowed.duplicates == "new":
                 row, number = replace(row, texts={**row.texts, Heading.PART_NUMBER: ""}), ""
             elif not allowed.duplicates and any(
@@ -169,7 +178,12 @@ def plan_parts(tx: Tx, read: PartRows, allowed: PartsAllowed = PARTS_AS_THEY_ARE
                 for other in rows
                 if other.texts.get(Heading.PART_NUMBER, "").casefold() == number.casefold()
             ):
-                problems.append(f"Part number: {number} stands in the file more than once")
+                problems.append(
+                    message(
+                        "Part number: {part_number} stands in the file more than once",
+                        part_number=number,
+                    )
+                )
                 could = "duplicates"
         if left_out:
             plan.append(ImportedPart(row.line, number, name, "skip", why=left_out))
@@ -180,7 +194,7 @@ def plan_parts(tx: Tx, read: PartRows, allowed: PartsAllowed = PARTS_AS_THEY_ARE
             problems += filter(None, (problem,))
         planned = _planned(row, item, known, problems, could)
         if planned.status == "error" and allowed.leave_out:
-            why = "; ".join(planned.problems)
+            why = joined("; ", planned.problems)
             planned = ImportedPart(row.line, planned.part_number, name, "skip", why=why)
         plan.append(planned)
     return plan
@@ -201,21 +215,31 @@ def _planned(
     if not code and (group or not number) and item is None:
         code = known.usual
         if not code:
-            what = f"there is no category {group[:60]!r}" if group else "a part without a number needs one"
-            problems.append(f"Category: {what}; name the category of such rows")
+            what = (
+                message("there is no category {category}", category=repr(group[:60]))
+                if group
+                else message("a part without a number needs one")
+            )
+            problems.append(message("Category: {problem}; name the category of such rows", problem=what))
             could = could or "category"
     if (link := texts.get(Heading.LINK)) and (problem := address_problem(link)):
-        problems.append(f"Link: {problem}")
+        problems.append(message("Link: {problem}", problem=problem))
     kind = texts.get(Heading.ITEM_TYPE, "").casefold()
     if kind and kind not in ITEM_TYPES:
-        problems.append(f"Item type: wanted {', '.join(ITEM_TYPES)}, got {kind[:40]!r}")
+        problems.append(
+            message(
+                "Item type: wanted {known}, got {item_type}",
+                known=", ".join(ITEM_TYPES),
+                item_type=repr(kind[:40]),
+            )
+        )
     if number and item is None:
         try:
             check_number(number)
         except RejectedError as error:
             problems.append(str(error))
     if not (number or name or texts.get(Heading.DESCRIPTION)):
-        problems.append("Name: is empty, and there is no part number")
+        problems.append(message("Name: is empty, and there is no part number"))
     if problems:
         return ImportedPart(
             row.line, number, name, "error", problems, could=could if len(problems) == 1 else ""
@@ -271,7 +295,9 @@ def _lacking(row: PartRow, there: Sequence[str] = ()) -> str:
     """Name the attachments of a row that Silo does not have; a table does not bring their content."""
     named = [name.strip() for name in row.texts.get(Heading.ATTACHMENTS, "").split(";")]
     lacking = [name for name in named if name and name not in there]
-    return f"without the attachments {listed(lacking, 5)}, which are no part of a table" if lacking else ""
+    if not lacking:
+        return ""
+    return message("without the attachments {names}, which are no part of a table", names=listed(lacking, 5))
 
 
 def apply_parts(
@@ -282,10 +308,19 @@ def apply_parts(
     RejectedError lists every problem; then nothing was changed.
     """
     plan, done = plan_parts(tx, read, allowed), Done()
-    problems = [f"row {row.row}: {problem}" for row in plan for problem in row.problems]
+    problems = [
+        message("row {row}: {problem}", row=row.row, problem=problem)
+        for row in plan
+        for problem in row.problems
+    ]
     if problems:
         raise RejectedError(
-            f"{len(problems)} problems in the file, so nothing was imported: {problems[0]}", problems
+            message(
+                "{n} problems in the file, so nothing was imported: {problem}",
+                n=len(problems),
+                problem=problems[0],
+            ),
+            problems,
         )
     for row in plan:
         if row.new is not None:

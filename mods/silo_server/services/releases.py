@@ -23,6 +23,7 @@ from sqlalchemy import func, insert, select, update
 
 from silo.api.wire import RELEASE_LABEL, ItemTexts
 from silo.bom.errors import ConflictError, ForbiddenError, NotFoundError, RejectedError
+from silo.bom.message import Message, beside, joined, message, read_beside
 from silo.bom.text import character_problem
 from silo_server.actors import Actor, Role, Scope
 from silo_server.db.rows import insert_rows, one_of
@@ -122,7 +123,12 @@ def list_releases(tx: Tx, item: Item) -> list[Release]:
 
 
 def _release(row: Any) -> Release:
-    return from_row(Release, row, blocks=tuple(json.loads(row.blocks)))
+    return from_row(Release, row, blocks=tuple(map(_read_block, json.loads(row.blocks))))
+
+
+def _read_block(stored: str | Mapping[str, Any]) -> str:
+    """Read what was open: with its template and values, or the sentence alone of an older release."""
+    return stored if isinstance(stored, str) else read_beside(stored)
 
 
 def find_release(tx: Tx, item: Item, label: str) -> Release | None:
@@ -141,7 +147,14 @@ def get_release(tx: Tx, item: Item, label: str) -> Release:
     release = find_release(tx, item, label)
     if release is None:
         there = ", ".join(other.label for other in list_releases(tx, item) if other.status in NUMBERED)
-        raise NotFoundError(f"{item.part_number} has no revision {label!r}; there is {there or 'none yet'}")
+        raise NotFoundError(
+            message(
+                "{part_number} has no revision {revision}; there is {known}",
+                part_number=item.part_number,
+                revision=repr(label),
+                known=there or message("none yet"),
+            )
+        )
     return release
 
 
@@ -261,7 +274,10 @@ def unreleased_parts(tx: Tx, record: str) -> list[str]:
 def blocks_of(tx: Tx, release: Release) -> list[str]:
     """List what keeps a submission from being released, in sentences."""
     parts = [] if release.with_parts else unreleased_parts(tx, release.record)
-    return [*release.blocks, *(f"{part}: not released as it is in this product" for part in parts)]
+    return [
+        *release.blocks,
+        *(message("{part}: not released as it is in this product", part=part) for part in parts),
+    ]
 
 
 def submit(
@@ -278,29 +294,43 @@ def submit(
     before = list_releases(tx, item)
     if waiting := next((other for other in before if other.status == "review"), None):
         raise ConflictError(
-            f"revision {waiting.label} of {item.part_number} is in review since {waiting.frozen_at[:10]}; "
-            "release, reject or withdraw it first"
+            message(
+                "revision {revision} of {part_number} is in review since {date}; release, reject or "
+                "withdraw it first",
+                revision=waiting.label,
+                part_number=item.part_number,
+                date=waiting.frozen_at[:10],
+            )
         )
     taken = [other.label for other in before if other.status in NUMBERED]
     label = label or next_label(taken, tx.settings.release_labels)
     if not re.fullmatch(RELEASE_LABEL, label, re.ASCII):
         raise RejectedError(
-            f"label: wanted a letter and up to 15 letters, digits or . _ -, or a number such as 1.0, got "
-            f"{label[:40]!r}"
+            message(
+                "label: wanted a letter and up to 15 letters, digits or . _ -, or a number such as 1.0, "
+                "got {label}",
+                label=repr(label[:40]),
+            )
         )
     if label.casefold() in map(str.casefold, taken):
-        raise ConflictError(f"{item.part_number} has a revision {label}; leave the label to the server")
+        raise ConflictError(
+            message(
+                "{part_number} has a revision {revision}; leave the label to the server",
+                part_number=item.part_number,
+                revision=label,
+            )
+        )
     _keep(tx, frozen.records)
     blocks = frozen.blocks
     if len(blocks) > MOST_BLOCKS:
-        blocks = [*blocks[:MOST_BLOCKS], f"and {len(blocks) - MOST_BLOCKS} more"]
+        blocks = [*blocks[:MOST_BLOCKS], message("and {n} more", n=len(blocks) - MOST_BLOCKS)]
     row = {
         "item_id": item.id,
         "label": label,
         "status": "review",
         "record": frozen.record,
         "with_parts": with_parts,
-        "blocks": dumps(list(blocks)),
+        "blocks": dumps([{"message": block, **beside(block)} for block in blocks]),
         "comment": comment,
         "frozen_at": frozen.at,
         "created_by": tx.actor.username,
@@ -331,18 +361,33 @@ def approve(tx: Tx, part_number: str, label: str, comment: str, override: str = 
     blocks = blocks_of(tx, release)
     override = override.strip() or release.override or ""
     if blocks and not override:
-        shown = "; ".join(blocks[:5]) + (f"; and {len(blocks) - 5} more" if len(blocks) > 5 else "")
+        shown = joined("; ", blocks[:5])
+        shown += message("; and {n} more", n=len(blocks) - 5) if len(blocks) > 5 else ""
         way = (
-            "fix that and submit it again, or say why it is released anyway (override)"
+            message("fix that and submit it again, or say why it is released anyway (override)")
             if tx.settings.release_override
-            else "fix that and submit it again"
+            else message("fix that and submit it again")
         )
-        raise ConflictError(f"revision {label} of {item.part_number} cannot be released: {shown}; {way}")
+        raise ConflictError(
+            message(
+                "revision {revision} of {part_number} cannot be released: {problems}; {way}",
+                revision=label,
+                part_number=item.part_number,
+                problems=shown,
+                way=way,
+            )
+        )
     if blocks and not tx.settings.release_override:
-        raise ForbiddenError("this server releases nothing that is blocked (SILO_RELEASE_OVERRIDE)")
+        raise ForbiddenError(message("this server releases nothing that is blocked (SILO_RELEASE_OVERRIDE)"))
     given = approvals_of(tx, release)
     if tx.actor.username in {other.username for other in given}:
-        raise ConflictError(f"you approved revision {label} already; {_approvals_text(tx, len(given))}")
+        raise ConflictError(
+            message(
+                "you approved revision {revision} already; {state}",
+                revision=label,
+                state=_approvals_text(tx, len(given)),
+            )
+        )
     approval = {"release_id": release.id, "username": tx.actor.username, "at": tx.stamp, "comment": comment}
     tx.conn.execute(insert(release_approvals).values(approval))
     if blocks:
@@ -351,7 +396,13 @@ def approve(tx: Tx, part_number: str, label: str, comment: str, override: str = 
         _announce(tx, item, release, "approved")
         return get_release(tx, item, label)
     if release.with_parts:
-        _release_parts(tx, release, f"with revision {label} of {item.part_number}")
+        _release_parts(
+            tx,
+            release,
+            message(
+                "with revision {revision} of {part_number}", revision=label, part_number=item.part_number
+            ),
+        )
     _make_released(tx, item, release)
     return get_release(tx, item, label)
 
@@ -381,13 +432,26 @@ def _release_parts(tx: Tx, release: Release, comment: str) -> None:
 def end(tx: Tx, part_number: str, label: str, status: str, note: str) -> Release:
     """Reject or withdraw a revision in review, or call a released one obsolete, with a comment."""
     if status == "withdrawn" and not tx.actor.role.covers(Role.EDITOR):
-        raise ForbiddenError(f"{tx.actor.username} is {tx.actor.role}, this needs editor")
+        raise ForbiddenError(
+            message(
+                "{username} is {role}, this needs editor",
+                username=tx.actor.username,
+                role=Message(tx.actor.role),
+            )
+        )
     if status == "obsolete":
         item = get_item(tx, part_number, include_archived=True, lock=True)
         release = get_release(tx, item, label)
         _check_right(tx)
         if release.status != "released":
-            raise ConflictError(f"revision {label} of {item.part_number} is {release.status}, not released")
+            raise ConflictError(
+                message(
+                    "revision {revision} of {part_number} is {status}, not released",
+                    revision=label,
+                    part_number=item.part_number,
+                    status=Message(release.status),
+                )
+            )
     else:
         item, release = _in_review(tx, part_number, label)
         if status == "rejected":
@@ -402,22 +466,34 @@ def _in_review(tx: Tx, part_number: str, label: str) -> tuple[Item, Release]:
     item = get_item(tx, part_number, include_archived=True, lock=True)
     release = get_release(tx, item, label)
     if release.status != "review":
-        raise ConflictError(f"revision {label} of {item.part_number} is {release.status}, not in review")
+        raise ConflictError(
+            message(
+                "revision {revision} of {part_number} is {status}, not in review",
+                revision=label,
+                part_number=item.part_number,
+                status=Message(release.status),
+            )
+        )
     return item, release
 
 
 def _check_right(tx: Tx) -> None:
     if not may_approve(tx, tx.actor):
         raise ForbiddenError(
-            f"{tx.actor.username} may not approve; an admin gives that right on the page Users"
+            message(
+                "{username} may not approve; an admin gives that right on the page Users",
+                username=tx.actor.username,
+            )
         )
     if not tx.actor.scope.covers(Scope.WRITE):
-        raise ForbiddenError("a token of the scope read cannot approve")
+        raise ForbiddenError(message("a token of the scope read cannot approve"))
 
 
 def _approvals_text(tx: Tx, given: int) -> str:
     wanted = tx.settings.release_approvals
-    return f"{given} of {wanted} approvals are given" if wanted > 1 else "it is released"
+    if wanted > 1:
+        return message("{n} of {wanted} approvals are given", n=given, wanted=wanted)
+    return message("it is released")
 
 
 def _change(tx: Tx, release: Release, **values: Any) -> None:
@@ -448,7 +524,10 @@ def read_records(tx: Tx, record: str) -> dict[str, dict[str, Any]]:
         lines += sum(len(entry["lines"]) for entry in read.values())
         if lines > tx.settings.max_expanded_rows:
             raise TooLargeError(
-                f"this revision has more than {tx.settings.max_expanded_rows} lines; look at one of its parts"
+                message(
+                    "this revision has more than {most} lines; look at one of its parts",
+                    most=tx.settings.max_expanded_rows,
+                )
             )
         level = (
             {line["child"] for entry in read.values() for line in entry["lines"]} - records.keys() - {None}

@@ -17,6 +17,7 @@ from sqlalchemy import ColumnElement, Row, func, insert, select, update
 from silo.api.wire import FACTS, FactSource
 from silo.bom.compare.base_revision import base_revision_of, would_undo
 from silo.bom.errors import NewerRevisionError, NotFoundError, RejectedError
+from silo.bom.message import message
 from silo.file_kind import MODEL
 from silo_server.db.tables import items, revisions
 from silo_server.db.transaction import Tx
@@ -84,8 +85,13 @@ def add_revision(
     if file is not None:
         if takes_models(of) and file.kind != MODEL:
             raise RejectedError(
-                f"the model of {of.subject} is a FreeCAD document, and the content of {file.name} is none "
-                f"({file.kind.replace('_', ' ')}); send it as an attachment of an item"
+                message(
+                    "the model of {subject} is a FreeCAD document, and the content of {file} is none "
+                    "({kind}); send it as an attachment of an item",
+                    subject=of.subject,
+                    file=file.name,
+                    kind=file.kind.replace("_", " "),
+                )
             )
         _check_base(tx, of, origin.base_revision, file.checksum)
     last = tx.conn.scalar(select(func.max(revisions.c.revision_number)).where(_of(of)))
@@ -163,9 +169,15 @@ def _check_base(tx: Tx, of: Item | Document, base: int | None, checksum: str | N
     if newest is None or not would_undo(newest, base, checksum):
         return
     raise NewerRevisionError(
-        f"{newest.created_by} committed revision {newest.revision_number} of {of.subject}, and this "
-        f"was made from revision {base}. Fetch the newer one first (silo-mod pull, Open from Silo), or "
-        "commit this on top of it in FreeCAD",
+        message(
+            "{user} committed revision {revision} of {subject}, and this was made from revision "
+            "{base}. Fetch the newer one first (silo-mod pull, Open from Silo), or commit this on top "
+            "of it in FreeCAD",
+            user=newest.created_by,
+            revision=newest.revision_number,
+            subject=of.subject,
+            base=base,
+        ),
         revision_to_wire(of, newest),
     )
 
@@ -210,7 +222,9 @@ def get_revision(tx: Tx, of: Item | Document, number: int) -> Revision:
         select(revisions).where(_of(of), revisions.c.revision_number == number)
     ).one_or_none()
     if row is None:
-        raise NotFoundError(f"{of.subject} has no revision {number}")
+        raise NotFoundError(
+            message("{subject} has no revision {revision}", subject=of.subject, revision=number)
+        )
     return _to_revision(row)
 
 
@@ -220,7 +234,7 @@ def with_file(tx: Tx, of: Item | Document) -> Item | Document:
     for holder in (of, *holders):
         if _newest_file(tx, holder) is not None:
             return holder
-    raise NotFoundError(f"{of.subject} has no file yet")
+    raise NotFoundError(message("{subject} has no file yet", subject=of.subject))
 
 
 def has_file(tx: Tx, item: Item) -> bool:

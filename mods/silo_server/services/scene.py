@@ -23,6 +23,7 @@ from sqlalchemy import insert, select, update
 
 from silo.api import wire
 from silo.bom.errors import NotFoundError, RejectedError
+from silo.bom.message import message
 from silo.bom.text import character_problem
 from silo.bounded_json import read_json
 from silo.budget import Budget
@@ -67,20 +68,31 @@ def unpacked(part: Part, body: bytes, packed: bool) -> bytes:
         try:
             body = reader.decompress(body, most + 1)
         except zlib.error as error:
-            raise RejectedError(f"{part}: wanted gzip, as Content-Encoding says, got damaged data") from error
+            raise RejectedError(
+                message("{part}: wanted gzip, as Content-Encoding says, got damaged data", part=part)
+            ) from error
         if len(body) <= most and (not reader.eof or reader.unused_data):
             raise RejectedError(
-                f"{part}: wanted one whole gzip stream, got one that is cut off or has data after its end"
+                message(
+                    "{part}: wanted one whole gzip stream, got one that is cut off or has data after its end",
+                    part=part,
+                )
             )
     if len(body) > most:
-        raise TooLargeError(f"{part}: wanted at most {most // MIB} MiB unpacked, got more")
+        raise TooLargeError(
+            message("{part}: wanted at most {most} MiB unpacked, got more", part=part, most=most // MIB)
+        )
     return body
 
 
 def keep(tx: Tx, store: FileStore, checksum: str, part: Part, body: bytes) -> None:
     """Store geometry or structure of a content, packed. Raises NotFoundError if no revision has it."""
     if tx.conn.scalar(select(revisions.c.id).where(revisions.c.file_checksum == checksum).limit(1)) is None:
-        raise NotFoundError(f"no revision has a file with the SHA-256 {checksum}; commit the file first")
+        raise NotFoundError(
+            message(
+                "no revision has a file with the SHA-256 {checksum}; commit the file first", checksum=checksum
+            )
+        )
     stored = store.keep(part, io.BytesIO(gzip.compress(body, 6, mtime=0)))
     values: dict[str, Any] = {part: stored.checksum}
     if part == "geometry":
@@ -141,7 +153,9 @@ def stored(tx: Tx, checksum: str, part: Part) -> str:
     """Find the hash of a part in the store. Raises NotFoundError."""
     value = tx.conn.scalar(select(models.c[part]).where(models.c.file_checksum == checksum))
     if value is None:
-        raise NotFoundError(f"the file with the SHA-256 {checksum} has no {part} yet")
+        raise NotFoundError(
+            message("the file with the SHA-256 {checksum} has no {part} yet", checksum=checksum, part=part)
+        )
     return str(value)
 
 
@@ -151,12 +165,14 @@ def check_structure(body: bytes) -> wire.Structure:
         data = read_json(body, STRUCTURE, "structure")
         structure = wire.Structure.model_validate(data)
     except (ValidationError, ValueError) as error:
-        raise RejectedError(f"structure: {_first(error)}") from error
+        raise RejectedError(message("structure: {problem}", problem=_first(error))) from error
     if unknown := _unknown_key(data, structure):
-        raise RejectedError(f"structure: {unknown[:200]} is no key of a structure")
+        raise RejectedError(message("structure: {key} is no key of a structure", key=unknown[:200]))
     uses = [use for product in structure.products.values() for use in product.uses]
     if len(uses) > MAX_USES:
-        raise RejectedError(f"structure: wanted at most {MAX_USES} uses, got {len(uses)}")
+        raise RejectedError(
+            message("structure: wanted at most {most} uses, got {uses}", most=MAX_USES, uses=len(uses))
+        )
     texts = [part for usage in uses for part in (usage.member, usage.file, usage.target, usage.uuid)]
     texts += [
         part
@@ -170,11 +186,13 @@ def check_structure(body: bytes) -> wire.Structure:
     ]
     texts += [text for usage in stated for text in (usage.material, usage.description) if text]
     if problem := character_problem("".join([*texts, *structure.roots])):
-        raise RejectedError(f"structure: {problem}")
+        raise RejectedError(message("structure: {problem}", problem=problem))
     lost = [key for key in structure.roots if key not in structure.products]
     lost += [usage.target for usage in uses if not usage.file and usage.target not in structure.products]
     if lost:
-        raise RejectedError(f"structure: wanted a product for each key, got none for {lost[0]!r}")
+        raise RejectedError(
+            message("structure: wanted a product for each key, got none for {key}", key=repr(lost[0]))
+        )
     return structure
 
 
@@ -212,9 +230,11 @@ def check_glb(body: bytes) -> None:
     try:
         problem = _glb_problem(body)
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError, struct.error) as error:
-        problem = f"it is no GLB that can be read ({type(error).__name__}: {error})"
+        problem = message(
+            "it is no GLB that can be read ({kind}: {problem})", kind=type(error).__name__, problem=error
+        )
     if problem:
-        raise RejectedError(f"geometry: {problem}")
+        raise RejectedError(message("geometry: {problem}", problem=problem))
 
 
 _SIZES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
@@ -259,25 +279,27 @@ def _unknown_parts(document: Mapping[str, Any]) -> Iterable[str]:
 def _glb_problem(body: bytes) -> str:
     magic, version, length, size, kind = struct.unpack_from("<4sIII4s", body)
     if (magic, version, length, kind) != (b"glTF", 2, len(body), b"JSON") or size > length - 20:
-        return "wanted a GLB of version 2 and of its own length, got another"
+        return message("wanted a GLB of version 2 and of its own length, got another")
     document = read_json(body[20 : 20 + size], GLB, "geometry", lambda name: float("nan"))
     rest = body[20 + size :]
     blob = memoryview(rest)[8:]
     if rest and (struct.unpack_from("<I4s", rest) != (len(blob), b"BIN\0")):
-        return "wanted one binary chunk behind the JSON, got another"
+        return message("wanted one binary chunk behind the JSON, got another")
     if unknown := sorted(set(document) - _KEYS) or sorted(_unknown_parts(document)):
-        return f"wanted nodes, meshes and materials only, got {unknown[0][:40]!r}"
+        return message(
+            "wanted nodes, meshes and materials only, got {unknown}", unknown=repr(unknown[0][:40])
+        )
     if set(document.get("extensionsUsed", ())) - {"KHR_mesh_quantization"}:
-        return "wanted no extension but KHR_mesh_quantization"
+        return message("wanted no extension but KHR_mesh_quantization")
     if any(buffer.get("uri") or buffer["byteLength"] > len(blob) for buffer in document.get("buffers", ())):
-        return "wanted one buffer inside the GLB, got another"
+        return message("wanted one buffer inside the GLB, got another")
     if not all(abs(number) <= MOST for number in _numbers(document)):
-        return "wanted finite numbers, got NaN or infinity"
+        return message("wanted finite numbers, got NaN or infinity")
     views = document.get("bufferViews", ())
     for view in views:
         start, count, stride = view.get("byteOffset", 0), view["byteLength"], view.get("byteStride", 0)
         if view["buffer"] != 0 or min(start, count, stride) < 0 or start + count > len(blob) or stride > 252:
-            return "a view lies outside of the buffer"
+            return message("a view lies outside of the buffer")
     accessors = document.get("accessors", ())
     for accessor in accessors:
         view, count, start = (
@@ -288,18 +310,18 @@ def _glb_problem(body: bytes) -> str:
         each = _SIZES[accessor["componentType"]] * _PARTS[accessor["type"]]
         end = start + (count - 1) * (view.get("byteStride") or each) + each
         if "sparse" in accessor or count < 1 or start < 0 or end > view["byteLength"]:
-            return "an accessor lies outside of its view"
+            return message("an accessor lies outside of its view")
     if sum(accessor["count"] for accessor in accessors) > MAX_VERTICES:
-        return f"wanted at most {MAX_VERTICES} vertices and indices, got more"
+        return message("wanted at most {most} vertices and indices, got more", most=MAX_VERTICES)
     nodes, meshes = document.get("nodes", ()), document.get("meshes", ())
     primitives = [primitive for mesh in meshes for primitive in mesh["primitives"]]
     if max(len(nodes), len(meshes)) > 20_000 or len(primitives) > 100_000:
         return "wanted at most 20 000 nodes and 100 000 primitives, got more"
     if sorted(document["scenes"][0].get("nodes", ())) != list(range(len(nodes))):
-        return "wanted each node once, below the scene"
+        return message("wanted each node once, below the scene")
     for node in nodes:
         if "children" in node or not isinstance(node["extras"]["key"], str):
-            return "wanted nodes without children, with the key of a product each"
+            return message("wanted nodes without children, with the key of a product each")
         if "mesh" in node:
             _at(meshes, node["mesh"])
     for primitive in primitives:
@@ -314,7 +336,7 @@ def _glb_problem(body: bytes) -> str:
             or len(counts) != 1
             or max(values) >= min(counts)
         ):
-            return "an index names a vertex that is not there"
+            return message("an index names a vertex that is not there")
         if "material" in primitive:
             _at(document["materials"], primitive["material"])
     return ""
@@ -322,7 +344,7 @@ def _glb_problem(body: bytes) -> str:
 
 def _at(rows: Sequence[Any], number: int) -> Any:
     if number < 0:
-        raise LookupError("a number of a row is negative")
+        raise LookupError(message("a number of a row is negative"))
     return rows[number]
 
 
@@ -365,7 +387,13 @@ def scene(tx: Tx, store: FileStore, item: Item, number: int | None) -> dict[str,
     """
     revision = newest_file(tx, item) if number is None else get_revision(tx, with_file(tx, item), number)
     if revision.file_checksum is None or not revision.is_model:
-        raise NotFoundError(f"revision {revision.revision_number} of {item.subject} has no model")
+        raise NotFoundError(
+            message(
+                "revision {revision} of {subject} has no model",
+                revision=revision.revision_number,
+                subject=item.subject,
+            )
+        )
     files = _files(tx, store, revision.file_checksum, as_recorded=number is not None)
     joined = Joined(files)
     top = files[revision.file_checksum]
@@ -374,7 +402,7 @@ def scene(tx: Tx, store: FileStore, item: Item, number: int | None) -> dict[str,
     named = [name for name in mine if name in top.products] if item.id else []
     root = named[0] if named else next(iter(top.roots), None)
     if not top.has_structure:
-        joined.lacks("", top.name, "its file has no model yet")
+        joined.lacks("", top.name, message("its file has no model yet"))
     elif root is not None:
         joined.below(top, root)
     uuids = {uuid.lower() for occurrence in joined.found for uuid in occurrence["lines"] if uuid}
@@ -484,21 +512,25 @@ class Joined:
         product = file.products[key]
         self._steps += 1
         if self._steps > MAX_OCCURRENCES:
-            raise TooLargeError(f"a scene has at most {MAX_OCCURRENCES} parts; open one of its assemblies")
+            raise TooLargeError(
+                message("a scene has at most {most} parts; open one of its assemblies", most=MAX_OCCURRENCES)
+            )
         uuid = lines[-1] if lines else product.uuid
         if (file.checksum, key) in self._open:
-            self.lacks(uuid, product.label, "it contains itself; it is left out where the ring closes")
+            self.lacks(
+                uuid, product.label, message("it contains itself; it is left out where the ring closes")
+            )
             return
         if len(path) > MAX_LEVELS:
-            self.lacks(uuid, product.label, f"it lies more than {MAX_LEVELS} levels deep")
+            self.lacks(uuid, product.label, message("it lies more than {most} levels deep", most=MAX_LEVELS))
             return
         if not all(abs(coordinate) <= 1e6 for coordinate in place):
-            self.lacks(uuid, product.label, "its place or its scale is beyond all bounds")
+            self.lacks(uuid, product.label, message("its place or its scale is beyond all bounds"))
             return
         if product.shape:
             self._draw(file, key, place, path, lines, color)
         elif not product.uses:
-            self.lacks(uuid, product.label, "its file holds no shape of it")
+            self.lacks(uuid, product.label, message("its file holds no shape of it"))
         self._open.add((file.checksum, key))
         for use in product.uses:
             target: File | None = file
@@ -506,11 +538,11 @@ class Joined:
                 target = self.files.get(target.links.get(hop) or "") if target is not None else None
             uuid = use.uuid
             if target is None:
-                self.lacks(uuid, use.target, f"its file {use.file} is not in Silo")
+                self.lacks(uuid, use.target, message("its file {file} is not in Silo", file=use.file))
             elif not target.has_structure:
-                self.lacks(uuid, target.name, "its file has no model yet")
+                self.lacks(uuid, target.name, message("its file has no model yet"))
             elif use.target not in target.products:
-                self.lacks(uuid, use.target, f"{target.name} has no such part any more")
+                self.lacks(uuid, use.target, message("{part} has no such part any more", part=target.name))
             else:
                 uuid = uuid or target.products[use.target].uuid
                 here = _times(place, use.matrix)
@@ -530,7 +562,9 @@ class Joined:
             file.index = len(self.drawn)
             self.drawn.append(file)
         if file.geometry is None:
-            self.lacks(lines[-1] if lines else "", file.products[key].label, "its file has no geometry yet")
+            self.lacks(
+                lines[-1] if lines else "", file.products[key].label, message("its file has no geometry yet")
+            )
         columns = [*(round(place[4 * row + col], 9) for col in range(4) for row in range(3))]
         matrix = [column for col in range(4) for column in (*columns[3 * col : 3 * col + 3], float(col == 3))]
         self.found.append(

@@ -20,6 +20,7 @@ from sqlalchemy import func, select
 from silo.bom.errors import InputError, NotFoundError, RejectedError, listed
 from silo.bom.headers import safe_cell
 from silo.bom.items.standard_kind import KINDS
+from silo.bom.message import message
 from silo.bom.numbers import whole_number
 from silo.bom.text import character_problem
 from silo.tables.category_rows import CATEGORIES, CategoryRow, CategoryRows, category_rows
@@ -55,7 +56,9 @@ def scheme_of(tx: Tx, name: str | None = None) -> Schema:
     if own is None or (name and name != own.name):
         if name and name not in (DEFAULT_SCHEMA, SITE):
             known = ", ".join([*([own.name] if own else []), DEFAULT_SCHEMA])
-            raise NotFoundError(f"schema: there is no {name!r}; known are {known}")
+            raise NotFoundError(
+                message("schema: there is no {schema}; known are {known}", schema=repr(name), known=known)
+            )
         return find_schema(None)
     return own
 
@@ -116,7 +119,12 @@ class SchemePlan:
     @property
     def problems(self) -> list[str]:
         """List what is wrong with the rows, and with the list as a whole."""
-        return [*(f"row {row.row}: {words}" for row in self.rows for words in row.problems), *self.refused]
+        wrong = [
+            message("row {row}: {problem}", row=row.row, problem=problem)
+            for row in self.rows
+            for problem in row.problems
+        ]
+        return [*wrong, *self.refused]
 
     @property
     def changed(self) -> int:
@@ -142,7 +150,7 @@ def plan_scheme(tx: Tx, read: CategoryRows) -> SchemePlan:
         planned = _planned(row, now)
         if planned.category is not None and planned.code in made:
             before = made[planned.code].row
-            problem = f"Code: {planned.code} stands in row {before} too"
+            problem = message("Code: {code} stands in row {before} too", code=planned.code, before=before)
             planned = replace(planned, status="error", problems=(*planned.problems, problem), category=None)
         elif planned.category is not None:
             made[planned.code] = planned
@@ -153,13 +161,15 @@ def plan_scheme(tx: Tx, read: CategoryRows) -> SchemePlan:
     kinds: dict[str, str] = {}
     for index, each in enumerate(rows):
         for kind in each.category.standard if each.category else ():
-            if other := kinds.setdefault(kind, each.code) != each.code and kinds[kind]:
-                problem = f"Standard parts: {kind} are of {other} already"
+            if kinds.setdefault(kind, each.code) != each.code:
+                problem = message(
+                    "Standard parts: {kind} are of {other} already", kind=kind, other=kinds[kind]
+                )
                 rows[index] = replace(each, status="error", problems=(*each.problems, problem))
     gone = [code for code in now.categories if code not in codes] if not any(r.problems for r in rows) else []
     held = _held(tx, gone)
     kept = [replace(now.categories[code], parent="") for code in held]
-    refused = [] if codes else ["the list has no category"]
+    refused = [] if codes else [message("the list has no category")]
     return SchemePlan(rows, [code for code in gone if code not in held], kept, refused)
 
 
@@ -176,29 +186,51 @@ def _planned(row: CategoryRow, now: Schema) -> ImportedCategory:
     code = (texts["code"] or texts["prefix"].rstrip("-_./ ") or name).upper()
     if row.left_out:
         return ImportedCategory(row.line, code, name, "skip", why=row.left_out)
-    problems = []
+    problems: list[str] = []
     if not name:
-        problems.append("Name: is empty")
-    for title, text, longest in (("Code", code, _LONGEST_CODE), ("Name", name, _LONGEST_NAME)):
+        problems.append(message("Name: is empty"))
+    for title, text, longest in (
+        (message("Code"), code, _LONGEST_CODE),
+        (message("Name"), name, _LONGEST_NAME),
+    ):
         problem = character_problem(text) or (
-            f"has more than {longest} characters" if len(text) > longest else ""
+            message("has more than {longest} characters", longest=longest) if len(text) > longest else ""
         )
         if problem:
-            problems.append(f"{title}: {problem}")
+            problems.append(message("{column}: {problem}", column=title, problem=problem))
     old = now.categories.get(code)
     prefix = texts["prefix"] or (old.prefix if old else f"{code}-")
     digits = whole_number(texts["digits"], 2) if texts["digits"] else (old.digits if old else 4)
     if digits is None or not 1 <= digits <= _MOST_DIGITS:
-        problems.append(f"Digits: wanted a number from 1 to {_MOST_DIGITS}, got {texts['digits'][:20]!r}")
-    if problem := character_problem(prefix) or ("is too long" if len(prefix) > _LONGEST_PREFIX else ""):
-        problems.append(f"Prefix: {problem}")
+        problems.append(
+            message(
+                "Digits: wanted a number from 1 to {most}, got {got}",
+                most=_MOST_DIGITS,
+                got=repr(texts["digits"][:20]),
+            )
+        )
+    too_long = message("is too long") if len(prefix) > _LONGEST_PREFIX else ""
+    if problem := character_problem(prefix) or too_long:
+        problems.append(message("Prefix: {problem}", problem=problem))
     kind = texts["item_type"].casefold() or (old.item_type if old else "part")
     if kind not in ITEM_TYPES:
-        problems.append(f"Item type: wanted {', '.join(ITEM_TYPES)}, got {kind[:40]!r}")
+        problems.append(
+            message(
+                "Item type: wanted {known}, got {item_type}",
+                known=", ".join(ITEM_TYPES),
+                item_type=repr(kind[:40]),
+            )
+        )
     standard = tuple(word.strip().casefold() for word in texts["standard"].replace(";", ",").split(","))
     standard = tuple(word for word in standard if word)
     if wrong := [word for word in standard if word not in KINDS]:
-        problems.append(f"Standard parts: wanted some of {', '.join(KINDS)}, got {listed(wrong, 5)}")
+        problems.append(
+            message(
+                "Standard parts: wanted some of {kinds}, got {wrong}",
+                kinds=", ".join(KINDS),
+                wrong=listed(wrong, 5),
+            )
+        )
     if problems:
         return ImportedCategory(row.line, code, name, "error", problems)
     category = Category(code, name, kind, code, prefix, digits or 4, texts["parent"], standard)
@@ -216,11 +248,11 @@ def _with_parent(
     parent = above.upper() if above.upper() in codes else names.get(above.casefold(), "")
     problem = ""
     if above and not parent:
-        problem = f"Parent: there is no category {above[:60]!r} in the file"
+        problem = message("Parent: there is no category {category} in the file", category=repr(above[:60]))
     seen, at = {row.code}, parent
     while at and not problem:
         if at in seen:
-            problem = f"Parent: {row.code} stands below itself"
+            problem = message("Parent: {code} stands below itself", code=row.code)
         seen.add(at)
         over = codes[at].parent
         at = over.upper() if over.upper() in codes else names.get(over.casefold(), "")
@@ -241,7 +273,11 @@ def apply_scheme(tx: Tx, read: CategoryRows) -> SchemePlan:
     plan = plan_scheme(tx, read)
     if plan.problems:
         raise RejectedError(
-            f"{len(plan.problems)} problems in the file, so nothing was imported: {plan.problems[0]}",
+            message(
+                "{n} problems in the file, so nothing was imported: {problem}",
+                n=len(plan.problems),
+                problem=plan.problems[0],
+            ),
             plan.problems,
         )
     if plan.changed:

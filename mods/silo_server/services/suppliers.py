@@ -26,6 +26,7 @@ from sqlalchemy import func, insert, select, update
 
 from silo.bom.errors import ConflictError, InputError, RejectedError, VersionConflictError
 from silo.bom.headers import Heading, safe_cell
+from silo.bom.message import Message, joined, message
 from silo.bom.numbers import Mark, NumberReading, read_number, whole_number, yes_or_no
 from silo.bom.quantities import as_decimal, decimal_text, exact_product
 from silo.bom.text import character_problem
@@ -267,44 +268,64 @@ class _Reader:
                 reading = NumberReading(shown, "")
             if reading.value is not None and least <= reading.value <= most and _places(reading.value) >= -12:
                 return reading.value
-            wanted = f"wanted a number from {least:f} to {most:f} with at most 12 decimals, got {text[:40]!r}"
-            problems.append(f"{COLUMNS[name]}: {reading.problem or wanted}")
+            wanted = message(
+                "wanted a number from {least} to {most} with at most 12 decimals, got {got}",
+                least=f"{least:f}",
+                most=f"{most:f}",
+                got=repr(text[:40]),
+            )
+            problems.append(_about(name, reading.problem or wanted))
             return Decimal(1)
 
         row = {name: cells.get(name, "").strip() for name in COLUMNS}
         tiny = Decimal("0.000001")
         if not row["supplier"]:
-            problems.append("Supplier: wanted a name, got nothing")
+            problems.append(message("Supplier: wanted a name, got nothing"))
         for name, longest in _LONGEST.items():
             problem = character_problem(row[name])
             if not problem and len(row[name]) > longest:
-                problem = f"wanted at most {longest} characters, got {len(row[name])}"
+                problem = message(
+                    "wanted at most {most} characters, got {length}", most=longest, length=len(row[name])
+                )
             if problem:
-                problems.append(f"{COLUMNS[name]}: {problem}")
+                problems.append(_about(name, problem))
         if row["link"] and (problem := address_problem(row["link"])):
-            problems.append(f"Link: {problem}")
+            problems.append(_about("link", problem))
         prices: dict[Decimal, Decimal] = {}
         for written in filter(None, map(str.strip, re.split("[;\n]", row["prices"]))):
             least, colon, price = written.rpartition(":")
             at = amount("prices", least, tiny, LARGEST_AMOUNT) if colon else Decimal(1)
             if at in prices:
-                problems.append(f"{COLUMNS['prices']}: there are two prices from {at:f} on")
+                problems.append(
+                    _about("prices", message("there are two prices from {quantity} on", quantity=f"{at:f}"))
+                )
             prices[at] = amount("prices", price, Decimal(0), LARGEST_PRICE)
         if len(prices) > MOST_PRICES:
-            problems.append(f"{COLUMNS['prices']}: wanted at most {MOST_PRICES} of them, got {len(prices)}")
+            many = message("wanted at most {most} of them, got {n}", most=MOST_PRICES, n=len(prices))
+            problems.append(_about("prices", many))
         currency = row["currency"].upper() or self.currency
         if not _CODE.fullmatch(currency):
-            problems.append(f"Currency: wanted three letters such as EUR, got {currency[:40]!r}")
+            problems.append(
+                message(
+                    "Currency: wanted three letters such as EUR, got {currency}", currency=repr(currency[:40])
+                )
+            )
         days = whole_number(row["lead_time_days"], 4)
         if row["lead_time_days"] and (days is None or days > LONGEST_LEAD_TIME):
             wrong = row["lead_time_days"][:40]
             problems.append(
-                f"Lead time [days]: wanted a whole number up to {LONGEST_LEAD_TIME}, got {wrong!r}"
+                message(
+                    "Lead time [days]: wanted a whole number up to {most}, got {got}",
+                    most=LONGEST_LEAD_TIME,
+                    got=repr(wrong),
+                )
             )
         word = row["preferred"].casefold()
         preferred = word in ("x", "✓", "✔", "y") or (yes_or_no(word) if word else False)
         if preferred is None:
-            problems.append(f"Preferred: wanted yes or nothing, got {row['preferred'][:40]!r}")
+            problems.append(
+                message("Preferred: wanted yes or nothing, got {got}", got=repr(row["preferred"][:40]))
+            )
         part = SupplierPart(
             row["supplier"],
             row["number"],
@@ -342,27 +363,47 @@ def read_parts(
         for number, cells in enumerate(rows, start=1)
         if any(text.strip() for text in cells.values())
     ]
-    problems = [f"row {number}: {problem}" for number, _, wrong in read for problem in wrong]
+    problems: list[str] = [
+        message("row {row}: {problem}", row=number, problem=problem)
+        for number, _, wrong in read
+        for problem in wrong
+    ]
     parts = [part for _, part, _ in read]
     problems += list_problems(parts)
     if problems:
-        raise RejectedError("; ".join(problems[:5]), problems)
+        raise RejectedError(joined("; ", problems[:5]), problems)
     return parts
 
 
 def list_problems(parts: Sequence[SupplierPart]) -> list[str]:
     """List what is wrong with the supplier parts of an item as a whole."""
     if len(parts) > MOST_PARTS:
-        return [f"wanted at most {MOST_PARTS} supplier parts of an item, got {len(parts)}"]
+        return [
+            message("wanted at most {most} supplier parts of an item, got {n}", most=MOST_PARTS, n=len(parts))
+        ]
     counts = Counter(supplier_part.key for supplier_part in parts)
-    problems = [
-        f"{part.supplier} {part.number}".strip() + " stands here twice; put all its prices into one row"
+    problems: list[str] = [
+        message(
+            "{supplier_part} stands here twice; put all its prices into one row",
+            supplier_part=f"{part.supplier} {part.number}".strip(),
+        )
         for part in {supplier_part.key: supplier_part for supplier_part in parts}.values()
         if counts[part.key] > 1
     ]
     if sum(part.preferred for part in parts) > 1:
-        problems.append("Preferred: wanted one supplier at most, got several")
+        problems.append(message("Preferred: wanted one supplier at most, got several"))
     return problems
+
+
+def _about(name: str, problem: str) -> Message:
+    """Say in which column the problem is."""
+    return message("{column}: {problem}", column=Message(COLUMNS[name]), problem=problem)
+
+
+def _changed(name: str, before: str, after: str) -> Message:
+    """Say what a column had before and has now; the script for translations knows the columns."""
+    column = COLUMNS[name].lower().replace(",", "")
+    return Message(f"{column} {{before}} → {{after}}", {"before": before or "–", "after": after or "–"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -381,22 +422,26 @@ class SupplierChange:
         old, new = (
             {part.key: part for part in map(from_json, json.loads(t))} for t in (self.before, self.after)
         )
-        lines = []
+        lines: list[str] = []
         for key in dict.fromkeys([*old, *new]):
             part = new.get(key) or old[key]
             who = f"{part.supplier} {part.number}".strip()
             if key not in old or key not in new:
-                lines.append(f"{who} added" if key in new else f"{who} removed")
+                lines.append(
+                    message("{supplier_part} added", supplier_part=who)
+                    if key in new
+                    else message("{supplier_part} removed", supplier_part=who)
+                )
                 continue
             before, after = texts_of(old[key]), texts_of(new[key])
             changes = [
-                f"{COLUMNS[name].lower().replace(',', '')} {before[name] or '–'} → {after[name] or '–'}"
-                for name in COLUMNS
-                if before[name] != after[name]
+                _changed(name, before[name], after[name]) for name in COLUMNS if before[name] != after[name]
             ]
-            words = ", ".join(changes)
-            lines += [f"{who} changed: {words}"] if words else []
-        return lines or ["the order of the list"]
+            words = joined(", ", changes) if changes else ""
+            lines += (
+                [message("{supplier_part} changed: {words}", supplier_part=who, words=words)] if words else []
+            )
+        return lines or [message("the order of the list")]
 
 
 def supplier_changes_of(tx: Tx, item: Item, limit: int = 20) -> list[SupplierChange]:
@@ -423,8 +468,13 @@ def set_supplier_parts(
     now = list_version(tx, item)
     if expected is not None and expected != now:
         raise VersionConflictError(
-            f"the suppliers of {item.part_number} have version {now}, the request was made from version "
-            f"{expected}; look at them again and repeat"
+            message(
+                "the suppliers of {part_number} have version {version}, the request was made from version "
+                "{expected}; look at them again and repeat",
+                part_number=item.part_number,
+                version=now,
+                expected=expected,
+            )
         )
     if list(parts) == supplier_parts_of(item):
         return item, 0
@@ -437,7 +487,10 @@ def undo_supplier_change(tx: Tx, part_number: str, change: int) -> Item:
     newest = next(iter(supplier_changes_of(tx, item, 1)), None)
     if newest is None or newest.id != change:
         raise ConflictError(
-            f"the suppliers of {item.part_number} were changed since; only the newest change can be undone"
+            message(
+                "the suppliers of {part_number} were changed since; only the newest change can be undone",
+                part_number=item.part_number,
+            )
         )
     return _write(tx, item, json.loads(newest.before))[0]
 
@@ -457,7 +510,7 @@ def _write(tx: Tx, item: Item, made: Sequence[Mapping[str, Any]]) -> tuple[Item,
     written = insert(supplier_changes).values(row).returning(supplier_changes.c.id)
     number = tx.conn.execute(written).scalar_one()
     index_item(tx, item.id)
-    announce.item_updated(tx, item, "suppliers changed")
+    announce.item_updated(tx, item, message("suppliers changed"))
     return get_item(tx, item.part_number), number
 
 
@@ -522,9 +575,17 @@ def _planned(rows: Sequence[PriceRow], items_by_number: Mapping[str, Item], read
     item = items_by_number.get(number)
     problems: list[str] = []
     if item is None:
-        what = f"{number!r} does not exist on this server, or is archived" if number else "is empty"
-        problems.append(f"row {rows[0].line}: Part number: {what}")
-    problems += [f"row {row.line}: {problem}" for row in rows for problem in row.problems]
+        what = (
+            message("{part_number} does not exist on this server, or is archived", part_number=repr(number))
+            if number
+            else message("is empty")
+        )
+        problems.append(message("row {row}: Part number: {problem}", row=rows[0].line, problem=what))
+    problems += [
+        message("row {row}: {problem}", row=row.line, problem=problem)
+        for row in rows
+        for problem in row.problems
+    ]
     named: dict[tuple[str, str], dict[str, str]] = {}
     for row in rows:
         cells = _cells_of(row)
@@ -534,15 +595,24 @@ def _planned(rows: Sequence[PriceRow], items_by_number: Mapping[str, Item], read
             first = before.setdefault(name, text) if name != "prices" and text else text
             if first != text:
                 problems.append(
-                    f"row {row.line}: {COLUMNS[name]} says {text[:40]!r}, row {before['row']} says "
-                    f"{first[:40]!r}"
+                    message(
+                        "row {row}: {column} says {text}, row {before_row} says {before}",
+                        row=row.line,
+                        column=Message(COLUMNS[name]),
+                        text=repr(text[:40]),
+                        before_row=before["row"],
+                        before=repr(first[:40]),
+                    )
                 )
         before["prices"] = "; ".join(filter(None, (before["prices"], cells["prices"])))
     there = {} if item is None else {part.key: part for part in supplier_parts_of(item)}
     was = list(there.values())
     if len(named) > MOST_PARTS:  # whatever the item has already
-        sentence = (
-            f"row {rows[0].line}: wanted at most {MOST_PARTS} supplier parts of an item, got {len(named)}"
+        sentence = message(
+            "row {row}: wanted at most {most} supplier parts of an item, got {n}",
+            row=rows[0].line,
+            most=MOST_PARTS,
+            n=len(named),
         )
         return ImportedItem(number, [row.line for row in rows], "error", [*problems, sentence])
     for key, cells in named.items():
@@ -550,7 +620,7 @@ def _planned(rows: Sequence[PriceRow], items_by_number: Mapping[str, Item], read
         given = {name: text for name, text in cells.items() if name in COLUMNS and text}
         # The values of the item were written by us, with points.
         part, wrong = reader.read(given)
-        problems += [f"row {cells['row']}: {problem}" for problem in wrong]
+        problems += [message("row {row}: {problem}", row=cells["row"], problem=problem) for problem in wrong]
         if kept and not wrong:
             old = there[key]
             names = [name for name in COLUMNS if name in given]
@@ -559,7 +629,14 @@ def _planned(rows: Sequence[PriceRow], items_by_number: Mapping[str, Item], read
             there = {k: supplier_part._replace(preferred=False) for k, supplier_part in there.items()}
         there[key] = part
     parts = list(there.values())
-    problems += [f"row {rows[0].line}: {problem}" for problem in list_problems(parts)] if not problems else []
+    problems += (
+        [
+            message("row {row}: {problem}", row=rows[0].line, problem=problem)
+            for problem in list_problems(parts)
+        ]
+        if not problems
+        else []
+    )
     status = "error" if problems else "same" if parts == was else "change"
     change = SupplierChange(
         0, "", "", *(dumps([to_json(supplier_part) for supplier_part in side]) for side in (was, parts))
@@ -585,7 +662,12 @@ def apply_suppliers(
     problems = [problem for item in plan for problem in item.problems]
     if problems:
         raise RejectedError(
-            f"{len(problems)} problems in the file, so nothing was imported: {problems[0]}", problems
+            message(
+                "{n} problems in the file, so nothing was imported: {problem}",
+                n=len(problems),
+                problem=problems[0],
+            ),
+            problems,
         )
     for item in plan:
         if item.status == "change":
@@ -638,15 +720,24 @@ def set_rates(
         if (shown := (known or {}).get(text)) is not None:
             reading = NumberReading(shown, "")
         if currency in rates:
-            problems.append(f"{currency}: stands here twice")
+            problems.append(message("{currency}: stands here twice", currency=currency))
         elif reading.value is None or not Decimal("1e-9") <= reading.value <= Decimal("1e9"):
-            problems.append(f"{currency}: {reading.problem or f'wanted a rate above 0, got {text!r}'}")
+            problems.append(
+                message(
+                    "{currency}: {problem}",
+                    currency=currency,
+                    problem=reading.problem or message("wanted a rate above 0, got {got}", got=repr(text)),
+                )
+            )
         else:
             rates[currency] = reading.value
     wrong = [other for other in rates if not _CODE.fullmatch(other)]
-    problems += [f"Currency: wanted three letters such as EUR, got {other[:20]!r}" for other in wrong]
+    problems += [
+        message("Currency: wanted three letters such as EUR, got {currency}", currency=repr(other[:20]))
+        for other in wrong
+    ]
     if problems:
-        raise RejectedError("; ".join(problems), problems)
+        raise RejectedError(joined("; ", problems), problems)
     rate_texts = {currency: decimal_text(rate) for currency, rate in rates.items()}
     audit.note(
         tx,

@@ -15,6 +15,7 @@ from sqlalchemy import delete, insert, select
 
 from silo.bom.errors import InputError
 from silo.bom.headers import normal
+from silo.bom.message import message
 from silo.bom.numbers import Mark
 from silo.tables.csv_text import DELIMITERS
 from silo.tables.kind import TableKind
@@ -38,7 +39,10 @@ def remembered_layout(tx: Tx, kind: str, data: bytes, of: TableKind) -> tuple[La
     delimiter, index = found[known.headings]
     said = json.loads(known.layout)
     mark = Mark(said["mark"]) if said["mark"] else None
-    note = f"the columns are those that {known.username} chose for a file with the same headings"
+    note = message(
+        "the columns are those that {username} chose for a file with the same headings",
+        username=known.username,
+    )
     return Layout(delimiter, index, said["columns"], mark), (note,)
 
 

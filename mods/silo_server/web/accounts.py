@@ -18,6 +18,7 @@ from fastapi import APIRouter, Depends, Path, Query, Request
 from starlette.responses import RedirectResponse, Response
 
 from silo.bom.errors import AuthError, ConflictError, ForbiddenError, RejectedError, SiloError
+from silo.bom.message import message
 from silo_server.actors import Actor, Role, Scope
 from silo_server.db.state import mode_of
 from silo_server.errors import TooManyAttemptsError
@@ -262,7 +263,11 @@ def choose_language(form: Form) -> Response:
     """Keep the language that a user chose, in a cookie of this browser."""
     chosen = text(form, "language")
     if chosen not in LANGUAGES:
-        raise RejectedError(f"language: wanted one of {', '.join(LANGUAGES)}, got {chosen!r}")
+        raise RejectedError(
+            message(
+                "language: wanted one of {known}, got {got}", known=", ".join(LANGUAGES), got=repr(chosen)
+            )
+        )
     response = back(local_path(text(form, "next")))
     response.set_cookie(LANGUAGE_COOKIE, chosen, max_age=LANGUAGE_SECONDS, httponly=True, samesite="lax")
     return response

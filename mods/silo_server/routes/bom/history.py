@@ -11,6 +11,7 @@ from pydantic import StrictBool, WithJsonSchema
 from starlette.responses import Response
 
 from silo.bom.errors import RejectedError
+from silo.bom.message import message
 from silo.bom.numbers import whole_number
 from silo_server.db.transaction import Tx
 from silo_server.fields import to_wire
@@ -158,10 +159,15 @@ def find_point(tx: Tx, item: Item, text: str) -> int:
         at = stamp(when) if when.tzinfo is not None else ""
     except (ValueError, OverflowError):
         raise RejectedError(
-            f"from, to: wanted a change id, a time such as 2026-02-08T22:15:00Z, or now, got {text!r}"
+            message(
+                "from, to: wanted a change id, a time such as 2026-02-08T22:15:00Z, or now, got {got}",
+                got=repr(text),
+            )
         ) from None
     if when.tzinfo is None:
-        raise RejectedError(f"from, to: wanted a time with its zone (such as …Z), got {text!r}")
+        raise RejectedError(
+            message("from, to: wanted a time with its zone (such as …Z), got {got}", got=repr(text))
+        )
     return history.change_at(tx, item, at)
 
 

@@ -13,6 +13,7 @@ from starlette.datastructures import UploadFile
 from starlette.responses import Response
 
 from silo.bom.errors import RejectedError
+from silo.bom.message import message
 from silo.tables.bom_rows import BOM
 from silo_server.db.answers import KeptAnswer, KeyedRequest, earlier_answer, keep_answer
 from silo_server.routes import openapi
@@ -156,5 +157,7 @@ async def uploaded(request: Request) -> tuple[bytes, str | None]:
     async with request.form(max_files=1, max_fields=20) as form:
         file = form.get("file")
         if not isinstance(file, UploadFile):
-            raise RejectedError("file: wanted a multipart form with the table in a part named 'file'")
+            raise RejectedError(
+                message("file: wanted a multipart form with the table in a part named 'file'")
+            )
         return await file.read(), clean_name(file.filename or "")

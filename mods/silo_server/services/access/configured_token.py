@@ -11,6 +11,7 @@ import re
 from sqlalchemy import select
 
 from silo.bom.errors import ConfigError
+from silo.bom.message import message
 from silo_server.db.tables import api_tokens, users
 from silo_server.db.transaction import Tx
 from silo_server.services.access.credentials import end_below
@@ -35,9 +36,13 @@ def take_configured_token(tx: Tx, user_id: int, secret: str) -> str:
     if row is None:
         create_token(tx, user_id, CONFIGURED, secret=secret)
     elif row.revoked_at is not None:
-        return f"it was revoked on {wire_time(row.revoked_at)}"
+        return message("it was revoked on {revoked_at}", revoked_at=wire_time(row.revoked_at))
     elif not row.active or (row.expires_at is not None and row.expires_at <= tx.stamp):
-        return "its user is not active" if not row.active else f"it ended on {wire_time(row.expires_at)}"
+        return (
+            message("its user is not active")
+            if not row.active
+            else message("it ended on {expires_at}", expires_at=wire_time(row.expires_at))
+        )
     others = (api_tokens.c.name == CONFIGURED) & (api_tokens.c.token_hash != secret_hash(secret))
     gone = select(api_tokens.c.credential_id).where(others, api_tokens.c.revoked_at.is_(None))
     if replaced := list(tx.conn.scalars(gone)):
@@ -50,11 +55,19 @@ def take_configured_token(tx: Tx, user_id: int, secret: str) -> str:
 def check_configured_secret(secret: str) -> None:
     """Raise ConfigError for a secret of the environment that others may guess or have read."""
     if not secret.isascii() or not secret.isprintable() or " " in secret:
-        problem = "visible ASCII characters without spaces, got others"
+        problem = message("visible ASCII characters without spaces, got others")
     elif _PLACEHOLDER.search(secret):
-        problem = "a secret of your own, got a placeholder that others know"
+        problem = message("a secret of your own, got a placeholder that others know")
     elif len(secret) < SHORTEST_SECRET:
-        problem = f"at least {SHORTEST_SECRET} characters, got {len(secret)}"
+        problem = message(
+            "at least {least} characters, got {length}", least=SHORTEST_SECRET, length=len(secret)
+        )
     else:
         return
-    raise ConfigError(f"{CONFIGURED}: wanted {problem}. This makes one: echo silo_$(openssl rand -hex 20)")
+    raise ConfigError(
+        message(
+            "{variable}: wanted {problem}. This makes one: echo silo_$(openssl rand -hex 20)",
+            variable=CONFIGURED,
+            problem=problem,
+        )
+    )

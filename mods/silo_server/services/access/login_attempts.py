@@ -12,6 +12,7 @@ from datetime import datetime, timedelta
 
 from sqlalchemy import ColumnElement, delete, func, insert, select, update
 
+from silo.bom.message import message
 from silo_server.db.tables import login_attempts
 from silo_server.db.transaction import Tx
 from silo_server.errors import TooManyAttemptsError
@@ -49,7 +50,9 @@ def _check_limit(
     delay = min(window, 8.0 ** min(1 + count - allowed, 9))
     wait = math.ceil(delay - (tx.at - datetime.fromisoformat(newest)).total_seconds())
     if wait > 0:
-        raise TooManyAttemptsError(f"too many failed logins; try again in {wait} seconds", wait)
+        raise TooManyAttemptsError(
+            message("too many failed logins; try again in {seconds} seconds", seconds=wait), wait
+        )
 
 
 def reserve_attempt(tx: Tx, username: str, address: str) -> int:

@@ -9,6 +9,7 @@ from datetime import timedelta
 from sqlalchemy import delete, insert, select
 
 from silo.bom.errors import AuthError, ForbiddenError
+from silo.bom.message import message
 from silo_server.actors import Actor, Role
 from silo_server.db.database import Database
 from silo_server.db.tables import login_links, users
@@ -28,11 +29,13 @@ def create_login_link(tx: Tx, username: str) -> str:
     password.
     """
     user = get_user(tx, username)
-    check_lasting(tx, "make a login link")
+    check_lasting(tx, message("make a login link"))
     if tx.actor.user_id == user.id:
         raise ForbiddenError(
-            "you cannot make a login link for your own account; set the password on the account page, or ask "
-            "another admin"
+            message(
+                "you cannot make a login link for your own account; set the password on the account page, "
+                "or ask another admin"
+            )
         )
     secret = secrets.token_urlsafe(32)
     expires = stamp(tx.at + timedelta(seconds=tx.settings.login_link_seconds))
@@ -61,4 +64,6 @@ def use_login_link(db: Database, secret: str, address: str) -> NewSession:
             if user is not None:
                 note(tx, "login.link", user.username)
                 return begin_session(tx, user.id, user.username, by_link=True, parent=row.credential_id)
-    raise AuthError("this login link was used already or is too old; start the server again for a new one")
+    raise AuthError(
+        message("this login link was used already or is too old; start the server again for a new one")
+    )

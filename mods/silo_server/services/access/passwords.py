@@ -85,7 +85,12 @@ def hash_password(password: str) -> str:
     """Hash a password with argon2id; RejectedError if it is too short or absurdly long."""
     if not MIN_PASSWORD <= len(password) <= MAX_PASSWORD:
         raise RejectedError(
-            f"password: wanted {MIN_PASSWORD} to {MAX_PASSWORD} characters, got {len(password)}"
+            message(
+                "password: wanted {least} to {most} characters, got {length}",
+                least=MIN_PASSWORD,
+                most=MAX_PASSWORD,
+                length=len(password),
+            )
         )
     with _HASHING.enter():
         return _hasher().hash(password)

@@ -13,6 +13,7 @@ from datetime import timedelta
 from sqlalchemy import delete, insert, select
 
 from silo.bom.errors import AuthError, ForbiddenError, RejectedError
+from silo.bom.message import message
 from silo_server.actors import Actor, Role
 from silo_server.db.database import Database
 from silo_server.db.tables import sessions, users
@@ -31,7 +32,7 @@ from silo_server.services.access.users import NO_TOKEN, User, change_user, row_o
 from silo_server.services.audit import note
 from silo_server.times import stamp
 
-WRONG = "user name or password is wrong"
+WRONG = message("user name or password is wrong")
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +65,9 @@ def set_own_password(db: Database, actor: Actor, new: str, current: str | None) 
         try:
             _proved(db, actor.username, current or "", actor.address)
         except AuthError:
-            raise RejectedError("current password: wanted your present password, got another one") from None
+            raise RejectedError(
+                message("current password: wanted your present password, got another one")
+            ) from None
     with db.write(actor, even_when_read_only=True) as tx:
         change_user(tx, actor.username, password=new)
 

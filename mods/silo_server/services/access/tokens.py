@@ -19,6 +19,7 @@ from typing import Any
 from sqlalchemy import insert, select, update
 
 from silo.bom.errors import ConflictError, ForbiddenError, NotFoundError, RejectedError, listed
+from silo.bom.message import message
 from silo_server.actors import Actor, Role, Scope
 from silo_server.db.database import Database
 from silo_server.db.rows import update_rows
@@ -34,8 +35,12 @@ def check_lasting(tx: Tx, what: str) -> None:
     """Raise ForbiddenError for an expiring token: it must not grant access that outlives it."""
     if tx.actor.expires_at is not None:
         raise ForbiddenError(
-            f"a token that ends on {wire_time(tx.actor.expires_at)} cannot {what}, which would last longer; "
-            "log in in a browser for that"
+            message(
+                "a token that ends on {expires_at} cannot {what}, which would last longer; log in in a "
+                "browser for that",
+                expires_at=wire_time(tx.actor.expires_at),
+                what=what,
+            )
         )
 
 
@@ -120,15 +125,26 @@ def create_own_token(
     actor = tx.actor
     check_may_change(actor)
     if name in (CONFIGURED, START_TOKEN):
-        raise RejectedError(f"name: {name} is what the server calls its own token; choose another name")
+        raise RejectedError(
+            message("name: {name} is what the server calls its own token; choose another name", name=name)
+        )
     if scope is not None and not actor.scope.covers(scope):
-        raise ForbiddenError(f"a token with the scope {actor.scope} cannot make one with the scope {scope}")
+        raise ForbiddenError(
+            message(
+                "a token with the scope {scope} cannot make one with the scope {wanted}",
+                scope=actor.scope,
+                wanted=scope,
+            )
+        )
     expires = stamp(tx.at + timedelta(days=days)) if days is not None else None
     if actor.expires_at is not None:
         if forever or (expires is not None and expires > actor.expires_at):
             raise ForbiddenError(
-                f"a token that ends on {wire_time(actor.expires_at)} cannot make one that lives longer; "
-                "log in in a browser for that"
+                message(
+                    "a token that ends on {expires_at} cannot make one that lives longer; log in in a "
+                    "browser for that",
+                    expires_at=wire_time(actor.expires_at),
+                )
             )
         expires = expires or actor.expires_at
     if secret is not None and (token := _made_before(tx, actor.own_id, secret)) is not None:
@@ -145,14 +161,16 @@ def _made_before(tx: Tx, user_id: int, secret: str) -> Token | None:
         return None
     token = next(other for other in list_tokens(tx, user_id) if other.id == token_id)
     if token.revoked_at or token.created_at < stamp(tx.at - timedelta(seconds=REPEAT_SECONDS)):
-        raise ConflictError(f"this form made the token {token.name} before; its secret was shown once")
+        raise ConflictError(
+            message("this form made the token {name} before; its secret was shown once", name=token.name)
+        )
     return token
 
 
 def check_may_change(actor: Actor) -> None:
     """Raise ForbiddenError for a token that may only read."""
     if actor.by_token and actor.scope is Scope.READ:
-        raise ForbiddenError("this token may only read; use one with the scope write")
+        raise ForbiddenError(message("this token may only read; use one with the scope write"))
 
 
 def create_token(
@@ -236,8 +254,12 @@ class ChildrenError(ConflictError):
     def __init__(self, name: str, living: Sequence[Credential]) -> None:
         names = listed([f"{each.kind} {each.name or each.username}" for each in living], 8)
         super().__init__(
-            f"token {name}: below it live {names}; say if they end as well (children=end, as after a leak) "
-            "or stay (children=keep)"
+            message(
+                "token {name}: below it live {names}; say if they end as well (children=end, as after a "
+                "leak) or stay (children=keep)",
+                name=name,
+                names=names,
+            )
         )
         self.living = tuple(living)
 
@@ -259,7 +281,7 @@ def revoke_token(tx: Tx, token_id: int, user_id: int | None, children: Children 
         query = query.where(api_tokens.c.user_id == user_id)
     row = tx.conn.execute(query).one_or_none()
     if row is None:
-        raise NotFoundError(f"there is no token {token_id} of yours")
+        raise NotFoundError(message("there is no token {token_id} of yours", token_id=token_id))
     name = row.name
     if children is None and (living := below(tx, [row.credential_id])):
         raise ChildrenError(name, living)

@@ -15,6 +15,7 @@ from typing import Any
 from sqlalchemy import func, insert, select, update
 
 from silo.bom.errors import ConflictError, ForbiddenError, NotFoundError, RejectedError
+from silo.bom.message import message
 from silo_server.actors import Role
 from silo_server.db.tables import api_tokens, device_logins, login_links, sessions, users
 from silo_server.db.transaction import ADMIN_LOCK, Tx
@@ -24,7 +25,7 @@ from silo_server.services.access.passwords import hash_password
 from silo_server.services.access.tokens import check_lasting
 from silo_server.services.audit import note
 
-NO_TOKEN = "a token cannot set the password of its own account; log in in a browser for that"
+NO_TOKEN = message("a token cannot set the password of its own account; log in in a browser for that")
 
 USERNAME_FORM = re.compile(r"[A-Za-z0-9][A-Za-z0-9._@-]{0,63}")
 
@@ -69,7 +70,7 @@ def get_user(tx: Tx, username: str) -> User:
     """Find a user by name, in upper or lower case; NotFoundError if there is none."""
     row = row_of(tx, username)
     if row is None:
-        raise NotFoundError(f"there is no user {username!r}")
+        raise NotFoundError(message("there is no user {username}", username=repr(username)))
     return to_user(row)
 
 
@@ -84,13 +85,16 @@ def create_user(
     """Make a user; RejectedError for an unusable name or password, DuplicateError for a taken name."""
     if not USERNAME_FORM.fullmatch(username):
         raise RejectedError(
-            "username: wanted 1 to 64 letters, digits or . _ @ - beginning with a letter or digit, "
-            f"got {username!r}"
+            message(
+                "username: wanted 1 to 64 letters, digits or . _ @ - beginning with a letter or digit, got "
+                "{username}",
+                username=repr(username),
+            )
         )
     if password is not None:
-        check_lasting(tx, "give a password")
+        check_lasting(tx, message("give a password"))
     if row_of(tx, username) is not None:
-        raise DuplicateError(f"username {username} is taken")
+        raise DuplicateError(message("username {username} is taken", username=username))
     tx.conn.execute(
         insert(users).values(
             username=username,
@@ -128,17 +132,19 @@ def change_user(
     if password is not None and tx.actor.by_token and tx.actor.user_id == user.id:
         raise ForbiddenError(NO_TOKEN)
     if role is not None and not user.role.covers(role):
-        check_lasting(tx, "give a higher role")
+        check_lasting(tx, message("give a higher role"))
     if active and not user.active:
-        check_lasting(tx, "let a user in again")
+        check_lasting(tx, message("let a user in again"))
     if approver and not user.approver:
-        check_lasting(tx, "give the right to approve")
+        check_lasting(tx, message("give the right to approve"))
     if password is not None:
-        check_lasting(tx, "set a password")
+        check_lasting(tx, message("set a password"))
     loses = (role is not None and role is not Role.ADMIN) or active is False
     admins = select(func.count()).where(users.c.role == Role.ADMIN.value, users.c.active)
     if loses and user.role is Role.ADMIN and user.active and tx.conn.execute(admins).scalar_one() <= 1:
-        raise ConflictError(f"{user.username} is the last admin; make another user an admin first")
+        raise ConflictError(
+            message("{username} is the last admin; make another user an admin first", username=user.username)
+        )
     given: dict[str, object] = {
         "role": role and role.value,
         "display_name": display_name,

@@ -6,6 +6,7 @@ from __future__ import annotations
 from sqlalchemy import delete, insert, select
 
 from silo.bom.errors import ForbiddenError
+from silo.bom.message import message
 from silo_server.actors import Role
 from silo_server.db.tables import assignees, users
 from silo_server.db.transaction import Tx
@@ -22,7 +23,12 @@ def assign(tx: Tx, part_number: str, username: str) -> None:
     if username:
         user = get_user(tx, username)
         if not (user.active and user.role.covers(Role.EDITOR)):
-            raise ForbiddenError(f"{user.username} cannot change BOMs, so cannot settle what is open in one")
+            raise ForbiddenError(
+                message(
+                    "{username} cannot change BOMs, so cannot settle what is open in one",
+                    username=user.username,
+                )
+            )
         tx.conn.execute(insert(assignees).values(item_id=item.id, user_id=user.id, at=tx.stamp))
     audit.note(tx, "bom.assigned", item.part_number, username or "nobody")
 

@@ -16,6 +16,7 @@ from typing import Any
 from sqlalchemy import delete, func, insert, select, update
 
 from silo.bom.errors import VersionConflictError
+from silo.bom.message import message
 from silo_server.db.rows import insert_rows, one_of, update_rows
 from silo_server.db.tables import bom_change_lines, bom_changes, bom_lines, items
 from silo_server.db.transaction import Tx
@@ -73,8 +74,13 @@ def check_version(parent: Item, expected: int | None) -> None:
     """Raise VersionConflictError unless the BOM still has the version that the request was made from."""
     if expected is not None and expected != parent.bom_version:
         raise VersionConflictError(
-            f"the BOM of {parent.part_number} has version {parent.bom_version}, the request was made from "
-            f"version {expected}; read it again and repeat"
+            message(
+                "the BOM of {part_number} has version {version}, the request was made from version "
+                "{expected}; read it again and repeat",
+                part_number=parent.part_number,
+                version=parent.bom_version,
+                expected=expected,
+            )
         )
 
 

@@ -13,6 +13,7 @@ from enum import StrEnum
 from sqlalchemy import update
 
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError, VersionConflictError
+from silo.bom.message import Message, joined, message, template
 from silo.bom.units import counts_pieces
 from silo_server.db.tables import bom_conflicts
 from silo_server.db.transaction import Tx
@@ -74,7 +75,7 @@ def resolve(
     stale = [d.line_id for d in decisions if d.line_id and d.seen and d.seen != marks.get(d.line_id)]
     if stale:
         raise LinesChangedError(
-            f"{len(stale)} of the lines were changed meanwhile; nothing was changed", stale
+            message("{n} of the lines were changed meanwhile; nothing was changed", n=len(stale)), stale
         )
     named: dict[str, list[Line]] = {}
     for line in lines:
@@ -86,19 +87,21 @@ def resolve(
             near = named.get(decision.line_id or decision.child_part_number.casefold(), ())
             line = component_of(near, which, parent)
             if line.id in seen:
-                raise RejectedError(f"{line.child_part_number} is decided twice")
+                raise RejectedError(
+                    message("{part_number} is decided twice", part_number=line.child_part_number)
+                )
             seen.add(line.id)
             after = _decided(line, decision, conflicts.get(line.id))
             settled.append(replace(decision, child_part_number=line.child_part_number, line_id=line.id))
         except (RejectedError, NotFoundError, ConflictError) as error:
-            problems.append(f"decisions[{index}]: {error}")
+            problems.append(message("decisions[{index}]: {problem}", index=index, problem=error))
             continue
         if decision.action is ReviewAction.KEEP_SILO:
             _accept(tx, parent, line)
         if after != line.state:
             changes.append(LineRecord(line.id, line.child_id, line.state, after, line.position))
     if problems:
-        raise RejectedError(f"nothing was changed: {problems[0]}", problems)
+        raise RejectedError(message("nothing was changed: {problem}", problem=problems[0]), problems)
     return _write(tx, parent, settled, changes)
 
 
@@ -108,11 +111,16 @@ def _decided(line: Line, decision: Decision, conflict: Conflict | None) -> LineS
         return None
     if decision.action is ReviewAction.KEEP:
         if state.unreferenced_since is None:
-            raise RejectedError(f"{line.child_part_number} is not unreferenced; there is nothing to keep")
+            raise RejectedError(
+                message(
+                    "{part_number} is not unreferenced; there is nothing to keep",
+                    part_number=line.child_part_number,
+                )
+            )
         kept = replace(state, source="manual", unreferenced_since=None, reason=reason)
         return owned_by_users(kept, state, line.child_unit)
     if conflict is None:
-        raise RejectedError(f"{line.child_part_number} is not in conflict")
+        raise RejectedError(message("{part_number} is not in conflict", part_number=line.child_part_number))
     if decision.action is ReviewAction.KEEP_SILO:
         return replace(state, override=False, cad_quantity=None, reason=reason or state.reason)
     if conflict.cad_quantity == 0:
@@ -137,10 +145,10 @@ def _accept(tx: Tx, parent: Item, line: Line) -> None:
 
 
 _WORDS = {
-    ReviewAction.REMOVE: "removed",
-    ReviewAction.KEEP: "kept as intentional",
-    ReviewAction.TAKE_CAD: "set to the assembly's quantity",
-    ReviewAction.KEEP_SILO: "kept at Silo's quantity",
+    ReviewAction.REMOVE: template("{n} removed"),
+    ReviewAction.KEEP: template("{n} kept as intentional"),
+    ReviewAction.TAKE_CAD: template("{n} set to the assembly's quantity"),
+    ReviewAction.KEEP_SILO: template("{n} kept at Silo's quantity"),
 }
 
 
@@ -148,11 +156,11 @@ def _write(
     tx: Tx, parent: Item, decisions: Sequence[Decision], changes: Sequence[LineRecord]
 ) -> tuple[int, int]:
     counts = {action: sum(d.action is action for d in decisions) for action in ReviewAction}
-    text = ", ".join(f"{count} {_WORDS[action]}" for action, count in counts.items() if count)
+    text = joined(", ", [Message(_WORDS[action], {"n": count}) for action, count in counts.items() if count])
     reasons = list(dict.fromkeys(d.reason for d in decisions if d.reason))
     note = ChangeNote(
         kind=ChangeKind.RESOLVE,
-        summary=text or "nothing decided",
+        summary=text or message("nothing decided"),
         reason="; ".join(reasons) or None,
         decisions=[
             {
@@ -189,7 +197,9 @@ def lines_for(tx: Tx, part_number: str, action: ReviewAction, seen: str) -> tupl
         for conflict in found.conflicts
     }
     if lines and seen != conflicts_mark(found.parent.bom_version, conflicts):
-        raise VersionConflictError(f"the BOM of {part_number} has changed since you looked")
+        raise VersionConflictError(
+            message("the BOM of {part_number} has changed since you looked", part_number=part_number)
+        )
     return lines, gone
 
 

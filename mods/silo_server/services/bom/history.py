@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import func, select
 
 from silo.bom.errors import NotFoundError
+from silo.bom.message import message
 from silo_server.db.rows import newest_first, one_of
 from silo_server.db.tables import bom_change_lines, bom_changes, items
 from silo_server.db.transaction import Tx
@@ -105,7 +106,13 @@ def get_change(tx: Tx, parent: Item, change_id: int) -> tuple[Change, list[Chang
     """Return one change with its lines; NotFoundError if this BOM has no such change."""
     changes = _changes(tx, [bom_changes.c.parent_id == parent.id, bom_changes.c.id == change_id], 1)
     if not changes:
-        raise NotFoundError(f"the BOM of {parent.part_number} has no change {change_id}")
+        raise NotFoundError(
+            message(
+                "the BOM of {part_number} has no change {change}",
+                part_number=parent.part_number,
+                change=change_id,
+            )
+        )
     return changes[0], lines_of_changes(tx, [change_id]).get(change_id, [])
 
 
@@ -158,7 +165,13 @@ def state_at(tx: Tx, parent: Item, change_id: int) -> list[PastLine]:
     """Return the BOM as change ``change_id`` left it; NotFoundError if the change is not one of this BOM."""
     owner = select(bom_changes.c.parent_id).where(bom_changes.c.id == change_id)
     if change_id != 0 and tx.conn.scalar(owner) != parent.id:
-        raise NotFoundError(f"the BOM of {parent.part_number} has no change {change_id}")
+        raise NotFoundError(
+            message(
+                "the BOM of {part_number} has no change {change}",
+                part_number=parent.part_number,
+                change=change_id,
+            )
+        )
     newest = (
         select(bom_change_lines.c.line_id, func.max(bom_change_lines.c.change_id).label("change_id"))
         .join(bom_changes, bom_changes.c.id == bom_change_lines.c.change_id)
@@ -187,7 +200,7 @@ def item_changed_by(tx: Tx, change_id: int) -> str:
     of_it = select(items.c.part_number).join(bom_changes, bom_changes.c.parent_id == items.c.id)
     value = tx.conn.scalar(of_it.where(bom_changes.c.id == change_id))
     if value is None:
-        raise NotFoundError(f"there is no change {change_id}")
+        raise NotFoundError(message("there is no change {change}", change=change_id))
     return str(value)
 
 

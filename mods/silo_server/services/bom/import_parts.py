@@ -11,6 +11,7 @@ from sqlalchemy import select
 
 from silo.bom.errors import RejectedError, listed
 from silo.bom.headers import Heading
+from silo.bom.message import message
 from silo.tables.bom_rows import BOUGHT, BomRow
 from silo_server.db.rows import one_of
 from silo_server.db.tables import items
@@ -80,7 +81,12 @@ def _identified(
         return IdentifiedRow(row, same[0])
     if same:
         return IdentifiedRow(
-            row, several=f"{maker or name}: {listed(same, 5)} are called so; give the part number"
+            row,
+            several=message(
+                "{name}: {part_numbers} are called so; give the part number",
+                name=maker or name,
+                part_numbers=listed(same, 5),
+            ),
         )
     return IdentifiedRow(row, unknown=maker or name)
 

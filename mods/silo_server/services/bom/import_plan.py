@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from silo.bom.message import message
 from silo_server.services.items import NewItem
 from silo_server.values import Line, LineState
 
@@ -103,7 +104,11 @@ class ImportPlan:
 
     @property
     def problems(self) -> list[str]:
-        return [f"row {row.row}: {problem}" for row in self.rows for problem in row.problems]
+        return [
+            message("row {row}: {problem}", row=row.row, problem=problem)
+            for row in self.rows
+            for problem in row.problems
+        ]
 
     @property
     def new(self) -> list[NewItem]:

@@ -20,6 +20,7 @@ from sqlalchemy import select
 from silo.api.wire import LineTexts
 from silo.bom.errors import InputError, RejectedError
 from silo.bom.headers import Heading, designators
+from silo.bom.message import message
 from silo.bom.numbers import whole_number
 from silo.bom.quantities import exact_sum
 from silo.bom.units import stored_unit
@@ -47,7 +48,7 @@ from silo_server.services.items import by_ids, create_item, get_item
 from silo_server.services.scheme import scheme_of
 from silo_server.values import Item, Line, LineState
 
-_LEFT_OUT_ABOVE = "stands below a row that is left out"
+_LEFT_OUT_ABOVE = message("stands below a row that is left out")
 
 
 def read_bom(data: bytes, max_rows: int, layout: Layout | None = None) -> BomRows:
@@ -102,7 +103,7 @@ def plan_import(tx: Tx, part_number: str, read: BomRows, allowed: Allowed = NOTH
             own = (file.parents[index], part.key, rel_type)
             anywhere = (file.assembly_key(index), part.key, rel_type)
             if own in seen:
-                problem = f"{row.part_number or row.name} stands here twice"
+                problem = message("{part} stands here twice", part=row.part_number or row.name)
                 row = replace(
                     row, status="error", problems=(problem,), could="add_up", before=None, after=None
                 )
@@ -130,7 +131,7 @@ def _file_of(tx: Tx, product: Item, read: BomRows) -> _File:
     if root is not None and parts[root].key == product.part_number.casefold():
         # The file begins with the product itself: its lines are the rows below.
         parts[root] = parts[root].with_row(
-            replace(read.rows[root], left_out="the product itself", problems=())
+            replace(read.rows[root], left_out=message("the product itself"), problems=())
         )
         parents = [None if above == root else above for above in parents]
     keys = {part.part_number.casefold() for part in parts} - {""}
@@ -170,7 +171,7 @@ def _plan_row(
     if row.left_out:
         return replace(base, why=row.left_out)
     if index in added:
-        words = f"added to row {file.parts[added[index]].of.line}"
+        words = message("added to row {row}", row=file.parts[added[index]].of.line)
         return replace(base, name=words, why=words)
     if above is not None and earlier[above].why and file.parts[above].of.left_out != "the product itself":
         return replace(base, why=_LEFT_OUT_ABOVE)
@@ -181,16 +182,21 @@ def _plan_row(
     child = file.ids.get(part.part_number.casefold()) if part.part_number else None
     new, could = None, ""
     if part.several:
-        problems.append(f"Part number: {part.several}")
+        problems.append(message("Part number: {several}", several=part.several))
     elif not part.key:
-        problems.append("Part number: is empty")
+        problems.append(message("Part number: is empty"))
     elif child is None and part.key not in made and allowed.category:
         new = new_item(part, allowed.category, problems)
     elif child is None and part.key not in made:
-        problems.append(f"Part number: {part.part_number or part.unknown!r} does not exist on this server")
+        problems.append(
+            message(
+                "Part number: {part} does not exist on this server",
+                part=repr(part.part_number or part.unknown),
+            )
+        )
         could = "make"
     elif child is not None and child[1] and line is None:
-        problems.append(f"Part number: {part.part_number!r} is archived")
+        problems.append(message("Part number: {part_number} is archived", part_number=repr(part.part_number)))
     before = line.state if line else None
     after = None
     if not problems:
@@ -200,7 +206,7 @@ def _plan_row(
         except RejectedError as error:
             problems.extend(error.problems)
     if not problems and row.doubt and after != before and not allowed.quantities:
-        problems.append(f"{row.doubt}; correct one of them, or let the quantity count")
+        problems.append(message("{doubt}; correct one of them, or let the quantity count", doubt=row.doubt))
         could = "quantities"
     if problems:
         return replace(
@@ -225,9 +231,11 @@ def _by_part(lines: Iterable[Line]) -> dict[tuple[str, str], Line]:
 def _again(row: ImportRow, before: ImportRow) -> ImportRow:
     """Judge a row of an assembly that stands in the file once more: it must say the same."""
     if row.after == before.after:
-        return replace(row, status="skip", why=f"the same as row {before.row}", new=None)
-    problem = (
-        f"{row.parent} has this part in row {before.row} too, with other values; an assembly has one BOM"
+        return replace(row, status="skip", why=message("the same as row {row}", row=before.row), new=None)
+    problem = message(
+        "{parent} has this part in row {row} too, with other values; an assembly has one BOM",
+        parent=row.parent,
+        row=before.row,
     )
     return replace(row, status="error", problems=(problem,), before=None, after=None, new=None)
 
@@ -284,21 +292,30 @@ def _file_rings(file: _File) -> dict[int, str]:
                     queue.append(below)
         return False
 
-    found = {}
+    found: dict[int, str] = {}
     parents = edges.keys()
     for index, part in enumerate(file.parts):
         key = file.assembly_key(index)
         if part.key in parents and part.key != key and not part.of.left_out and reaches(part.key, key):
-            found[index] = (
-                f"Part number: {part.part_number or part.unknown} contains its own assembly in this file"
+            found[index] = message(
+                "Part number: {part} contains its own assembly in this file",
+                part=part.part_number or part.unknown,
             )
     return found
 
 
 def _in_a_ring(assembly: str, ring: Sequence[str]) -> str:
     if len(ring) <= 2:
-        return f"Part number: {assembly} is the assembly itself, which cannot be a part of itself"
-    return f"Part number: {ring[1]} contains {assembly} itself ({' → '.join(ring)})"
+        return message(
+            "Part number: {assembly} is the assembly itself, which cannot be a part of itself",
+            assembly=assembly,
+        )
+    return message(
+        "Part number: {part} contains {assembly} itself ({path})",
+        part=ring[1],
+        assembly=assembly,
+        path=" → ".join(ring),
+    )
 
 
 # Rows that differ in one of these are not added up.
@@ -361,7 +378,9 @@ def _changes(row: BomRow, problems: list[str]) -> dict[str, Any]:
         revision = row.texts[Heading.REVISION]
         changes["child_revision"] = whole_number(revision, 6)
         if revision and changes["child_revision"] is None:
-            problems.append(f"Revision: wanted a whole number, got {revision[:40]!r}")
+            problems.append(
+                message("Revision: wanted a whole number, got {revision}", revision=repr(revision[:40]))
+            )
     return changes
 
 
@@ -390,7 +409,11 @@ def apply_import(
     plan = plan_import(tx, part_number, read, allowed)
     if plan.problems:
         raise RejectedError(
-            f"{len(plan.problems)} problems in the file, so nothing was imported: {plan.problems[0]}",
+            message(
+                "{n} problems in the file, so nothing was imported: {problem}",
+                n=len(plan.problems),
+                problem=plan.problems[0],
+            ),
             plan.problems,
         )
     made = {index: create_item(tx, row.new)[0] for index, row in enumerate(plan.rows) if row.new}
@@ -435,8 +458,10 @@ def apply_import(
 def _note(records: Sequence[LineRecord], file_name: str | None) -> ChangeNote:
     added = sum(record.before is None for record in records)
     removed = sum(record.after is None for record in records)
-    words = f"imported: {added} added, {len(records) - added - removed} changed"
-    words += f", {removed} removed" if removed else ""
+    words = message(
+        "imported: {added} added, {removed} changed", added=added, removed=len(records) - added - removed
+    )
+    words += message(", {removed} removed", removed=removed) if removed else ""
     return ChangeNote(kind=ChangeKind.IMPORT, summary=words, document_file=file_name)
 
 

@@ -15,6 +15,7 @@ from typing import Any
 from sqlalchemy import delete, insert, select, update
 
 from silo.bom.left_out import Reason, in_words, remembered
+from silo.bom.message import joined, message
 from silo_server.db.rows import one_of
 from silo_server.db.tables import bom_last_syncs
 from silo_server.db.transaction import Tx
@@ -77,8 +78,9 @@ class LastSync:
     @property
     def incomplete(self) -> str:
         """Say that the BOM lacks something, and what; "" if it does not."""
-        words = [f"incomplete: {self.words}"] if self.words else []
-        return ", ".join([*words, *([str(self.held.words)] if self.held is not None else [])])
+        words = [message("incomplete: {words}", words=self.words)] if self.words else []
+        words += [self.held.words] if self.held is not None else []
+        return joined(", ", words) if words else ""
 
     def to_wire(self) -> dict[str, Any]:
         """Return the last sync as the API sends it."""
@@ -167,11 +169,14 @@ def _sentence(gap: Mapping[str, Any]) -> str:
     name, count = gap.get("name") or gap.get("object") or "", gap.get("quantity")
     who = f"{count} × {name}" if count else str(name)
     where = f" ({gap['file']})" if gap.get("file") else ""
-    texts = {
-        Reason.MISSING: f"{who}{where}: the file is missing or cannot be read",
-        Reason.UNREGISTERED: f"{who}{where}: no part number yet",
-        Reason.BROKEN: str(gap.get("message", "")),
-        Reason.HELD: f"a later BOM is {gap.get('message', '')}",
-        Reason.REFUSED: f"a later sync was refused: {gap.get('message', '')}",
+    why = gap.get("message", "")
+    texts: dict[str, str] = {
+        Reason.MISSING: message(
+            "{part}{where}: the file is missing or cannot be read", part=who, where=where
+        ),
+        Reason.UNREGISTERED: message("{part}{where}: no part number yet", part=who, where=where),
+        Reason.BROKEN: why,
+        Reason.HELD: message("a later BOM is {state}", state=why),
+        Reason.REFUSED: message("a later sync was refused: {problem}", problem=why),
     }
-    return texts.get(gap["reason"], f"{gap['reason']}: {who}{where} {gap.get('message', '')}").rstrip()
+    return texts.get(gap["reason"]) or f"{gap['reason']}: {who}{where} {why}".rstrip()

@@ -9,6 +9,7 @@ from typing import Any
 
 from silo.api.wire import LineTexts
 from silo.bom.errors import RejectedError
+from silo.bom.message import Message, joined, message
 from silo.bom.quantities import plain, same_quantity
 from silo.bom.text import character_problem
 from silo.bom.units import PIECES, counts_pieces, line_unit, stored_unit
@@ -58,11 +59,19 @@ def add_line(
     for line in lines_of(tx, parent):
         if line.child_id == child.id and line.state.rel_type == state.rel_type:
             raise DuplicateError(
-                f"{child.part_number} is in the BOM of {parent.part_number} already; change its line instead"
+                message(
+                    "{part_number} is in the BOM of {parent} already; change its line instead",
+                    part_number=child.part_number,
+                    parent=parent.part_number,
+                )
             )
     check_no_cycle(tx, parent, [child.id])
     change = LineRecord(new_line_id(), child.id, None, state)
-    text = f"{child.part_number} added, quantity {plain(state.quantity)}"
+    text = message(
+        "{part_number} added, quantity {quantity}",
+        part_number=child.part_number,
+        quantity=plain(state.quantity),
+    )
     return _apply(tx, parent, change, child.part_number, text, why)
 
 
@@ -92,14 +101,29 @@ def change_line(
     if after.rel_type != line.state.rel_type and any(
         (other.child_id, other.state.rel_type) == (line.child_id, after.rel_type) for other in lines
     ):
-        raise DuplicateError(f"{child} is in this BOM as {after.rel_type} already")
+        raise DuplicateError(
+            message(
+                "{part_number} is in this BOM as {rel_type} already",
+                part_number=child,
+                rel_type=after.rel_type,
+            )
+        )
     fields = sorted(k for k in {*changes, "unit"} if getattr(after, k) != getattr(line.state, k))
     if not same_quantity(after.quantity, line.state.quantity):
-        quantity = f"quantity {plain(line.state.quantity)} → {plain(after.quantity)}"
+        quantity = message(
+            "quantity {before} → {after}", before=plain(line.state.quantity), after=plain(after.quantity)
+        )
         fields = [quantity, *(name for name in fields if name != "quantity")]
-    words = ", ".join(name.replace("_", " ") for name in fields) or "source"
+    words = joined(", ", [Message(name.replace("_", " ")) for name in fields] or [Message("source")])
     change = LineRecord(line.id, line.child_id, line.state, after, line.position)
-    return _apply(tx, parent, change, child, f"{child} changed: {words}", why)
+    return _apply(
+        tx,
+        parent,
+        change,
+        child,
+        message("{part_number} changed: {words}", part_number=child, words=words),
+        why,
+    )
 
 
 def remove_line(
@@ -119,9 +143,18 @@ def remove_line(
     parent = parent_to_change(tx, part_number, expected)
     line = line_of(lines_of(tx, parent), which, parent)
     if seen is not None and seen != mark_of(line.state):
-        raise LinesChangedError(f"{line.child_part_number} was changed meanwhile", [line.id])
+        raise LinesChangedError(
+            message("{part_number} was changed meanwhile", part_number=line.child_part_number), [line.id]
+        )
     change = LineRecord(line.id, line.child_id, line.state, None, line.position)
-    return _apply(tx, parent, change, line.child_part_number, f"{line.child_part_number} removed", why)
+    return _apply(
+        tx,
+        parent,
+        change,
+        line.child_part_number,
+        message("{part_number} removed", part_number=line.child_part_number),
+        why,
+    )
 
 
 def edited_state(before: LineState, changes: Mapping[str, Any], child_unit: str | None = None) -> LineState:
@@ -172,23 +205,42 @@ def check_state(state: LineState) -> None:
     problems = []
     problem = quantity_problem(state.quantity)
     if problem:
-        problems.append(f"quantity: {problem}")
+        problems.append(message("quantity: {problem}", problem=problem))
     if state.rel_type not in REL_TYPES:
-        problems.append(f"rel_type: wanted one of {', '.join(REL_TYPES)}, got {state.rel_type!r}")
+        problems.append(
+            message(
+                "rel_type: wanted one of {known}, got {rel_type}",
+                known=", ".join(REL_TYPES),
+                rel_type=repr(state.rel_type),
+            )
+        )
     if state.source not in SOURCES:
-        problems.append(f"source: wanted one of {', '.join(SOURCES)}, got {state.source!r}")
+        problems.append(
+            message(
+                "source: wanted one of {known}, got {source}",
+                known=", ".join(SOURCES),
+                source=repr(state.source),
+            )
+        )
     for name, field in LineTexts.model_fields.items():
         value, limit = getattr(state, name), text_hints(field).get("maxLength")
         if value is not None and limit and len(value) > limit:
-            problems.append(f"{name}: wanted at most {limit} characters, got {len(value)}")
+            problems.append(
+                message(
+                    "{field}: wanted at most {most} characters, got {length}",
+                    field=name,
+                    most=limit,
+                    length=len(value),
+                )
+            )
     for name in (*LineTexts.model_fields, "reason", "reference_designators"):
         for written in (value,) if isinstance(value := getattr(state, name), str) else value or ():
             if problem := character_problem(written):
-                problems.append(f"{name}: {problem}")
+                problems.append(message("{field}: {problem}", field=name, problem=problem))
     if state.metadata and (problem := json_problem(state.metadata)):
-        problems.append(f"metadata: {problem}")
+        problems.append(message("metadata: {problem}", problem=problem))
     if problems:
-        raise RejectedError("; ".join(problems), problems)
+        raise RejectedError(joined("; ", problems), problems)
 
 
 def _apply(tx: Tx, parent: Item, change: LineRecord, child: str, text: str, why: str | None = None) -> Edited:

@@ -12,6 +12,7 @@ from typing import Any
 from sqlalchemy import Integer, Select, func, literal_column, select, type_coerce
 
 from silo.bom.errors import ConflictError, NotFoundError
+from silo.bom.message import message
 from silo_server.db.rows import one_of
 from silo_server.db.tables import bom_lines, items
 from silo_server.db.transaction import Tx
@@ -93,7 +94,13 @@ def check_line_count(tx: Tx, parent_ids: Sequence[int]) -> None:
     count = sum(counts.get(parent_id, 0) for parent_id in parent_ids)
     most = min(MOST_LINES_AT_ONCE, tx.settings.max_expanded_rows)
     if count > most and len(parent_ids) > 1:
-        raise TooLargeError(f"these BOMs have {count} lines, an answer at most {most}; ask for fewer")
+        raise TooLargeError(
+            message(
+                "these BOMs have {lines} lines, an answer at most {most}; ask for fewer",
+                lines=count,
+                most=most,
+            )
+        )
 
 
 def lines_of_many(tx: Tx, parent_ids: Collection[int]) -> dict[int, list[Line]]:
@@ -125,18 +132,35 @@ def line_of(lines: Iterable[Line], which: str | LineId, parent: Item) -> Line:
     if isinstance(which, LineId):
         line = next((line for line in lines if line.id == which.id), None)
         if line is None:
-            raise NotFoundError(f"the BOM of {parent.part_number} has no line with the id {which.id!r}")
+            raise NotFoundError(
+                message(
+                    "the BOM of {part_number} has no line with the id {line}",
+                    part_number=parent.part_number,
+                    line=repr(which.id),
+                )
+            )
         return line
     key = which.casefold()
     matches = [line for line in lines if line.child_part_number.casefold() == key]
     if len(matches) > 1:
         ids = ", ".join(f"{line.state.rel_type}: {line.id}" for line in matches)
         raise ConflictError(
-            f"the BOM of {parent.part_number} has {len(matches)} lines for {which!r} ({ids}); "
-            "name a line by its id"
+            message(
+                "the BOM of {part_number} has {n} lines for {child} ({lines}); name a line by its id",
+                part_number=parent.part_number,
+                n=len(matches),
+                child=repr(which),
+                lines=ids,
+            )
         )
     if not matches:
-        raise NotFoundError(f"the BOM of {parent.part_number} has no line for {which!r}")
+        raise NotFoundError(
+            message(
+                "the BOM of {part_number} has no line for {child}",
+                part_number=parent.part_number,
+                child=repr(which),
+            )
+        )
     return matches[0]
 
 

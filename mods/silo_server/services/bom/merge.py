@@ -20,6 +20,7 @@ from silo.bom.compare.bom_diff import BomDiff, QuantityChange
 from silo.bom.compare.merge import MergePlan, plan_merge
 from silo.bom.compare.owner import is_manual
 from silo.bom.errors import RejectedError
+from silo.bom.message import message
 from silo.bom.quantities import plain, quantity_of
 from silo_server.db.answers import KeptAnswer, KeyedRequest, earlier_answer, keep_answer
 from silo_server.db.rows import insert_rows, one_of
@@ -202,15 +203,27 @@ def _children(
     problems = list(request.problems)
     for entry in request.entries:
         if entry.key not in names:
-            name = f"entries[{entry.index}].child_part_number: {entry.part_number!r}"
+            name = message(
+                "entries[{index}].child_part_number: {part_number}",
+                index=entry.index,
+                part_number=repr(entry.part_number),
+            )
             gone = entry.key in archived
-            problem = f"{name} is archived" if gone else f"{name} does not exist on this server"
+            problem = (
+                message("{entry} is archived", entry=name)
+                if gone
+                else message("{entry} does not exist on this server", entry=name)
+            )
             problems.append((entry.index, problem))
     if problems:
         texts = [text for _, text in sorted(problems, key=lambda problem: problem[0])]
         raise RejectedError(
-            f"{len(texts)} of the entries cannot be merged, so nothing was changed: {texts[0]}"
-            + (f" (and {len(texts) - 1} more)" if len(texts) > 1 else ""),
+            message(
+                "{n} of the entries cannot be merged, so nothing was changed: {problem}{more}",
+                n=len(texts),
+                problem=texts[0],
+                more=message(" (and {n} more)", n=len(texts) - 1) if len(texts) > 1 else "",
+            ),
             texts,
         )
     return child_ids, names

@@ -14,6 +14,7 @@ from typing import Any
 
 from silo.bom.errors import RejectedError
 from silo.bom.left_out import Reason
+from silo.bom.message import joined, message
 from silo.bom.quantities import LARGEST_QUANTITY, quantity_of
 from silo_server.errors import TooLargeError
 from silo_server.services.field_checks import quantity_problem, sha256_or_none, shortened, text_problem
@@ -72,14 +73,20 @@ def read_merge_request(body: Any, max_entries: int) -> MergeRequestIn:
     if not isinstance(body, Mapping) or not isinstance(body.get("entries"), list):
         raise RejectedError('body: wanted {"entries": [{"child_part_number": …, "quantity": …}, …]}')
     if len(body["entries"]) > max_entries:
-        raise TooLargeError(f"entries: this server takes at most {max_entries}, got {len(body['entries'])}")
+        raise TooLargeError(
+            message(
+                "entries: this server takes at most {most}, got {entries}",
+                most=max_entries,
+                entries=len(body["entries"]),
+            )
+        )
     sync_id, dry_run = body.get("sync_id"), body.get("dry_run")
     if sync_id is not None and (
-        problem := text_problem(sync_id, 128) if sync_id else "wanted a text, got none"
+        problem := text_problem(sync_id, 128) if sync_id else message("wanted a text, got none")
     ):
-        raise RejectedError(f"sync_id: {problem}")
+        raise RejectedError(message("sync_id: {problem}", problem=problem))
     if dry_run is not None and not isinstance(dry_run, bool):
-        raise RejectedError("dry_run: wanted true or false")
+        raise RejectedError(message("dry_run: wanted true or false"))
     document = _document(body.get("document"))
     entries: list[MergeRequestEntry] = []
     problems: list[tuple[int, str]] = []
@@ -106,34 +113,48 @@ def read_held_report(body: Any, max_entries: int) -> tuple[list[dict[str, Any]],
 def _sums_too_large(entries: Sequence[MergeRequestEntry]) -> list[tuple[int, str]]:
     """Find children whose sum over several entries exceeds the limit of one entry."""
     sums: dict[str, Decimal] = {}
-    problems = []
+    problems: list[tuple[int, str]] = []
     for entry in entries:
         sums[entry.key] = sums.get(entry.key, Decimal(0)) + entry.quantity
         if sums[entry.key] > LARGEST_QUANTITY:
-            text = f"entries[{entry.index}].quantity: all entries of {entry.part_number!r} add up to over 1e9"
+            text = message(
+                "entries[{index}].quantity: all entries of {part_number} add up to over 1e9",
+                index=entry.index,
+                part_number=repr(entry.part_number),
+            )
             problems.append((entry.index, text))
     return problems
 
 
 def _entry(index: int, raw: Any) -> tuple[MergeRequestEntry | None, str | None]:
     if not isinstance(raw, Mapping):
-        return None, f"entries[{index}]: wanted an object, got {shortened(raw)}"
+        return None, message("entries[{index}]: wanted an object, got {got}", index=index, got=shortened(raw))
     name, quantity = raw.get("child_part_number"), raw.get("quantity")
     problem = quantity_problem(quantity)
-    text = None if problem is None else f"entries[{index}].quantity: {problem}"
-    wrong = text_problem(name, 200) or (None if str(name).strip() else "wanted a part number, got none")
+    text = (
+        None
+        if problem is None
+        else message("entries[{index}].quantity: {problem}", index=index, problem=problem)
+    )
+    wrong = text_problem(name, 200) or (
+        None if str(name).strip() else message("wanted a part number, got none")
+    )
     if wrong:
-        missing = f"entries[{index}].child_part_number: {wrong}"
-        return None, missing if text is None else f"{missing}; {text}"
+        missing = message("entries[{index}].child_part_number: {problem}", index=index, problem=wrong)
+        return None, missing if text is None else joined("; ", (missing, text))
     # An entry with a bad quantity is still looked up, so that an unknown number is reported as well.
     components, wrong = _components(index, raw.get("components"))
     proposed = raw.get("find_number")
     refused = None if proposed is None else text_problem(proposed, LONGEST_FIND_NUMBER)
-    wrong_number = refused and f"entries[{index}].find_number: {refused}"
+    wrong_number = refused and message(
+        "entries[{index}].find_number: {problem}", index=index, problem=refused
+    )
     amount = quantity_of(1 if text else quantity or 0)
     number = None if refused or proposed is None else proposed.strip() or None
     entry = MergeRequestEntry(index, str(name).strip(), amount, components, number)
-    return entry, "; ".join(filter(None, (text, wrong, wrong_number))) or None
+    return entry, joined("; ", wrong_texts) if (
+        wrong_texts := list(filter(None, (text, wrong, wrong_number)))
+    ) else None
 
 
 def _components(index: int, raw: Any) -> tuple[Sequence[Mapping[str, str]], str | None]:
@@ -146,7 +167,7 @@ def _components(index: int, raw: Any) -> tuple[Sequence[Mapping[str, str]], str 
         if wrong := text_problem(component.get("file"), 4096) or text_problem(
             component.get("object", ""), 1024
         ):
-            return (), f"{where}: {wrong}"
+            return (), message("{entry}: {problem}", entry=where, problem=wrong)
     return [{"file": component["file"], "object": component.get("object", "")} for component in raw], None
 
 
@@ -157,7 +178,11 @@ def _left_out(raw: Any, most: int) -> list[dict[str, Any]]:
     if raw is None:
         return []
     if not isinstance(raw, list) or len(raw) > most:
-        raise RejectedError(f"left_out: wanted a list of at most {most} objects, got {shortened(raw)}")
+        raise RejectedError(
+            message(
+                "left_out: wanted a list of at most {most} objects, got {got}", most=most, got=shortened(raw)
+            )
+        )
     return [_left_out_part(index, part) for index, part in enumerate(raw)]
 
 
@@ -168,13 +193,17 @@ def _left_out_part(index: int, raw: Any) -> dict[str, Any]:
     for name, longest in _LEFT_OUT_TEXTS.items():
         value = raw.get(name, "")
         if problem := text_problem(value, longest):
-            raise RejectedError(f"left_out[{index}].{name}: {problem}")
+            raise RejectedError(
+                message("left_out[{index}].{name}: {problem}", index=index, name=name, problem=problem)
+            )
         if value:
             part[name] = value
     quantity = raw.get("quantity", 0)
     if isinstance(quantity, bool) or quantity != 0:
         if problem := quantity_problem(quantity):
-            raise RejectedError(f"left_out[{index}].quantity: {problem}")
+            raise RejectedError(
+                message("left_out[{index}].quantity: {problem}", index=index, problem=problem)
+            )
         part["quantity"] = quantity
     return part
 
@@ -186,12 +215,12 @@ def _document(raw: Any) -> tuple[str | None, str | None, str | None, int | None]
         raise RejectedError('document: wanted {"file": …, "sha256": …, "revision": …}')
     file, folder, revision = raw.get("file"), raw.get("folder"), raw.get("revision")
     if problem := text_problem(file, 4096):
-        raise RejectedError(f"document.file: {problem}")
+        raise RejectedError(message("document.file: {problem}", problem=problem))
     if folder is not None and (problem := text_problem(folder, 1024)):
-        raise RejectedError(f"document.folder: {problem}")
+        raise RejectedError(message("document.folder: {problem}", problem=problem))
     sha256 = sha256_or_none("document.sha256", raw.get("sha256"))
     if isinstance(revision, float) and revision.is_integer():
         revision = int(revision)  # 2.0 is a whole number in JSON
     if revision is not None and not (type(revision) is int and 0 <= revision < 2**31):
-        raise RejectedError("document.revision: wanted a whole number")
+        raise RejectedError(message("document.revision: wanted a whole number"))
     return file, folder, sha256, revision

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from silo.bom.errors import ConflictError
+from silo.bom.message import message
 from silo_server.db.rows import one_of
 from silo_server.db.tables import bom_conflicts
 from silo_server.db.transaction import Tx
@@ -46,7 +47,7 @@ def restore_bom(
         raise ArchivedPartsError(archived)
     check_no_cycle(tx, parent, [line.child.id for line in missing])
     changes.extend(LineRecord(m.line_id, m.child.id, None, m.state, m.position) for m in missing)
-    text = f"restored as of change {change_id}: {len(changes)} lines changed"
+    text = message("restored as of change {change}: {n} lines changed", change=change_id, n=len(changes))
     note = ChangeNote(kind=ChangeKind.RESTORE, summary=text, reason=reason, refers_to=change_id)
     return apply_changes(tx, parent, changes, note)
 
@@ -59,7 +60,11 @@ def undo_change(tx: Tx, part_number: str, change_id: int, expected: int | None) 
     parent = parent_to_change(tx, part_number, expected)
     change, lines = get_change(tx, parent, change_id)
     if change.kind == ChangeKind.FOLDED:
-        raise ConflictError(f"change {change_id} cannot be undone: what was before it is no longer kept")
+        raise ConflictError(
+            message(
+                "change {change} cannot be undone: what was before it is no longer kept", change=change_id
+            )
+        )
     current = {line.id: line for line in lines_of(tx, parent)}
     untouched = {
         (line.child_id, line.state.rel_type): line.id
@@ -75,14 +80,18 @@ def undo_change(tx: Tx, part_number: str, change_id: int, expected: int | None) 
     ]
     if touched:
         raise ConflictError(
-            f"change {change_id} cannot be undone: {', '.join(touched[:10])} changed again since; "
-            "restore the BOM of that time instead, or change the lines"
+            message(
+                "change {change} cannot be undone: {part_numbers} changed again since; restore the BOM of "
+                "that time instead, or change the lines",
+                change=change_id,
+                part_numbers=", ".join(touched[:10]),
+            )
         )
     check_no_cycle(tx, parent, [line.child.id for line in lines if line.after is None])
     changes = [LineRecord(n.line_id, n.child.id, n.after, n.before, n.position) for n in lines]
     _reopen(tx, parent, change, current)
     words = change.summary  # called so for its translation
-    text = f"undone: {words}"
+    text = message("undone: {words}", words=words)
     return apply_changes(
         tx, parent, changes, ChangeNote(kind=ChangeKind.UNDO, summary=text, refers_to=change_id)
     )

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 from sqlalchemy import select, update
 
+from silo.bom.message import message
 from silo.bom.units import Unit, unit_of
 from silo_server.db.tables import bom_lines, items, orders
 from silo_server.db.transaction import Tx
@@ -45,7 +46,11 @@ def _name_unit(tx: Tx, item: Item, unit: Unit) -> None:
             for line in lines_of(tx, parent)
             if line.child_id == item.id and line.state.unit is None and line.state.source == "manual"
         ]
-        text = f"the unit of {item.part_number} changed: its line stays in {unit.symbol}"
+        text = message(
+            "the unit of {part_number} changed: its line stays in {unit}",
+            part_number=item.part_number,
+            unit=unit.symbol,
+        )
         apply_changes(tx, parent, records, ChangeNote(kind=ChangeKind.EDIT, summary=text))
     unsaid = (orders.c.item_id == item.id) & orders.c.unit.is_(None)
     tx.conn.execute(update(orders).where(unsaid).values(unit=unit.symbol))

@@ -10,6 +10,7 @@ from decimal import Decimal
 from functools import lru_cache
 
 from silo.bom.errors import ConflictError
+from silo.bom.message import message
 from silo.bom.quantities import as_decimal, exact_product
 from silo.bom.units import converted, line_unit, unit_of
 from silo_server.values import Line
@@ -79,7 +80,11 @@ def checked_total(amount: Exact, line: Line) -> Exact:
     """Return an amount of the child of a line; ConflictError above :data:`MAX_TOTAL`."""
     if amount > MAX_TOTAL:
         raise ConflictError(
-            f"the quantities above {line.child_part_number} multiply to more than {MAX_TOTAL:.0e}, which "
-            "cannot be right; look for a wrong quantity on the way to it"
+            message(
+                "the quantities above {part_number} multiply to more than {most}, which cannot be right; "
+                "look for a wrong quantity on the way to it",
+                part_number=line.child_part_number,
+                most=f"{MAX_TOTAL:.0e}",
+            )
         )
     return amount

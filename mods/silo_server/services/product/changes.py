@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from sqlalchemy import select
 
+from silo.bom.message import message
 from silo.bom.quantities import plain
 from silo.file_kind import MODEL
 from silo_server.db.rows import one_of
@@ -205,4 +206,8 @@ def data_differs(then: Mapping[str, Any], now: Mapping[str, Any]) -> tuple[str, 
 
 def _file(revisions_with_file: Sequence[Any]) -> str:
     last = revisions_with_file[-1] if revisions_with_file else None
-    return f"{last.file_name}, revision {last.revision_number}" if last else ""
+    return (
+        message("{file}, revision {revision}", file=last.file_name, revision=last.revision_number)
+        if last
+        else ""
+    )

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
+from silo.bom.message import message
 from silo.bom.quantities import plain
 from silo_server.services.product.amounts import UNIT_OPEN, Exact, amount_of, checked_total, product
 from silo_server.services.product.graph import Graph, order_of
@@ -40,11 +41,17 @@ class FlatRow(NamedTuple):
 
     def doubts(self, pieces: int = 1) -> list[str]:
         """List what a reviewer still has to decide about the part, in words."""
-        doubt_texts = ["unreferenced"] if self.gone else []
+        doubt_texts: list[str] = [message("unreferenced")] if self.gone else []
         if 0 < self.gone < self.total:
-            doubt_texts = [f"{plain(self.gone * pieces)} of {plain(self.total * pieces)} unreferenced"]
+            doubt_texts = [
+                message(
+                    "{gone} of {total} unreferenced",
+                    gone=plain(self.gone * pieces),
+                    total=plain(self.total * pieces),
+                )
+            ]
         if self.disputed:
-            doubt_texts.append("a quantity in conflict")
+            doubt_texts.append(message("a quantity in conflict"))
         return [*doubt_texts, UNIT_OPEN] if self.unit_open else doubt_texts
 
 

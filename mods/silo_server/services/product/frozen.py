@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import select
 
 from silo.api.wire import ItemTexts
+from silo.bom.message import Message, message
 from silo.bom.quantities import plain
 from silo.file_kind import KIND_WORDS, MODEL
 from silo_server.db.rows import one_of
@@ -94,10 +95,17 @@ def freeze(tx: Tx, item: Item) -> FrozenProduct:
         text = dumps(_record(items[item_id], worth, written, beside.get(item_id, ()), lines))
         hashes[item_id] = hashlib.sha256(text.encode()).hexdigest()
         records[hashes[item_id]] = text
-    blocks = [f"{bom.part_number}: {bom.words}" for bom in worths[item.id].open.values()]
-    blocks += [f"{part.part_number}: no file" for part in without_file if _is_modelled(part)]
+    blocks: list[str] = [
+        message("{part_number}: {words}", part_number=bom.part_number, words=bom.words)
+        for bom in worths[item.id].open.values()
+    ]
     blocks += [
-        f"{part.part_number}: no {KIND_WORDS[kind]}"
+        message("{part_number}: no file", part_number=part.part_number)
+        for part in without_file
+        if _is_modelled(part)
+    ]
+    blocks += [
+        message("{part_number}: no {kind}", part_number=part.part_number, kind=Message(KIND_WORDS[kind]))
         for part in filter(_is_modelled, items.values())
         for kind in tx.settings.release_kinds
         if kind not in {attachment.kind for attachment in beside.get(part.id, ())}

@@ -15,6 +15,7 @@ from typing import Any
 from sqlalchemy import Select, literal, select
 
 from silo.bom.errors import CycleError
+from silo.bom.message import message
 from silo.bom.quantities import plain
 from silo_server.db.rows import among
 from silo_server.db.tables import bom_lines, items
@@ -44,9 +45,13 @@ class Graph:
     def doubts(self, line: Line) -> list[str]:
         """List what a user still has to decide about a line, in words."""
         quantity = self.cad_quantity(line)
-        doubts = ["unreferenced"] if line.state.unreferenced_since else []
+        doubts: list[str] = [message("unreferenced")] if line.state.unreferenced_since else []
         if quantity is not None:
-            doubts.append(f"CAD says {plain(quantity)}" if quantity else "CAD no longer has it")
+            doubts.append(
+                message("CAD says {quantity}", quantity=plain(quantity))
+                if quantity
+                else message("CAD no longer has it")
+            )
         return [*doubts, UNIT_OPEN] if unit_is_open(line) else doubts
 
     def names(self) -> dict[int, str]:
@@ -79,8 +84,12 @@ def load_graph(tx: Tx, root: Item, depth: int | None = None, *, bare: bool = Fal
         for number, row in enumerate(chain.from_iterable(rows.partitions())):
             if number == most:
                 raise TooLargeError(
-                    f"there are more than {most} different lines below {root.part_number}; ask for one of "
-                    "its sub-assemblies, or for less with depth="
+                    message(
+                        "there are more than {most} different lines below {part_number}; ask for one of its "
+                        "sub-assemblies, or for less with depth=",
+                        most=most,
+                        part_number=root.part_number,
+                    )
                 )
             if (child := names.get(row[2])) is None:
                 names[row[2]] = child = child_of(row)

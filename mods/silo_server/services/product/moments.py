@@ -10,6 +10,7 @@ from sqlalchemy import select
 
 from silo.api.wire import RELEASE_LABEL
 from silo.bom.errors import NotFoundError, RejectedError
+from silo.bom.message import message
 from silo.bom.numbers import whole_number
 from silo_server.db.tables import revisions
 from silo_server.db.transaction import Tx
@@ -29,7 +30,11 @@ def moment(tx: Tx, item: Item, text: str, *, end: bool = False) -> str:
             select(row.created_at).where(row.item_id == item.id, row.revision_number == number)
         )
         if value is None:
-            raise NotFoundError(f"{item.part_number} has no revision {number}")
+            raise NotFoundError(
+                message(
+                    "{part_number} has no revision {revision}", part_number=item.part_number, revision=number
+                )
+            )
         return str(value)
     try:
         when = datetime.fromisoformat(text.replace(" ", "+"))
@@ -41,6 +46,10 @@ def moment(tx: Tx, item: Item, text: str, *, end: bool = False) -> str:
         pass
     is_label = re.fullmatch(RELEASE_LABEL, text, re.ASCII)
     raise (NotFoundError if is_label else RejectedError)(
-        "wanted a date such as 2026-02-08, a time with its zone such as 2026-02-08T22:15:00Z, a revision of "
-        f"{item.part_number} such as r3, or one of its frozen revisions, got {text[:60]!r}"
+        message(
+            "wanted a date such as 2026-02-08, a time with its zone such as 2026-02-08T22:15:00Z, a "
+            "revision of {part_number} such as r3, or one of its frozen revisions, got {time}",
+            part_number=item.part_number,
+            time=repr(text[:60]),
+        )
     )

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from silo.bom.errors import counted
+from silo.bom.message import joined, message
 from silo_server.services.product.amounts import UNIT_OPEN
 from silo_server.services.product.worth import MassAndCost
 
@@ -38,12 +39,23 @@ class OpenBom(NamedTuple):
         """Count what a user has to decide there, in words."""
         counts = ((self.unreferenced, "unreferenced line"), (self.conflicts, "conflict"))
         words = [counted(count, word) for count, word in counts if count]
-        return ", ".join([*words, f"{UNIT_OPEN} on {counted(self.units, 'line')}"] if self.units else words)
+        return _listed(
+            [
+                *words,
+                message("{unit_open} on {lines}", unit_open=UNIT_OPEN, lines=counted(self.units, "line")),
+            ]
+            if self.units
+            else words
+        )
 
     @property
     def words(self) -> str:
         """Describe all that is open, with what the last sync left out."""
-        return ", ".join(filter(None, (self.questions, self.incomplete)))
+        return _listed([text for text in (self.questions, self.incomplete) if text])
+
+
+def _listed(words: Sequence[str]) -> str:
+    return joined(", ", words) if words else ""
 
 
 class LastChange(NamedTuple):
@@ -105,7 +117,10 @@ class Summary:
         below = len(self.open) - (own in self.open)
         words = [here.incomplete]
         if not is_open:
-            words += [here.questions, f"open in {counted(below, 'BOM')} below" if below else ""]
+            words += [
+                here.questions,
+                message("open in {boms} below", boms=counted(below, "BOM")) if below else "",
+            ]
         return [*filter(None, words)]
 
     @property

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import select
 
 from silo.bom.errors import BusyError
+from silo.bom.message import message
 from silo.bom.quantities import exact_product, exact_sum
 from silo_server.db.rows import one_of
 from silo_server.db.tables import bom_changes, bom_lines, items, product_summaries
@@ -133,8 +134,12 @@ def _lines_below(
                     if tx.built is not None:
                         tx.built.append(Unmade(wanted))
                     raise BusyError(
-                        f"there are more than {most} different lines in this product that are not summed up "
-                        "yet. The server sums them up now: ask again in a minute, or look at a sub-assembly"
+                        message(
+                            "there are more than {most} different lines in this product that are not summed "
+                            "up yet. The server sums them up now: ask again in a minute, or look at a "
+                            "sub-assembly",
+                            most=most,
+                        )
                     )
                 line = to_line(row)
                 lines.setdefault(line.parent_id, []).append(line)

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from silo.bom.message import message
 from silo_server.errors import TooLargeError
 from silo_server.services.product.amounts import Exact, totals_of
 from silo_server.services.product.graph import Graph, order_of
@@ -47,8 +48,11 @@ def expand(graph: Graph, depth: int, limit: int) -> Iterator[Occurrence]:
             stack.pop()
         if count > limit:
             raise TooLargeError(
-                f"the expanded BOM of {graph.root.part_number} has more than {limit} lines; "
-                "ask for less with depth="
+                message(
+                    "the expanded BOM of {part_number} has more than {most} lines; ask for less with depth=",
+                    part_number=graph.root.part_number,
+                    most=limit,
+                )
             )
 
 
