@@ -16,6 +16,7 @@ from starlette.datastructures import FormData
 from starlette.responses import RedirectResponse, Response
 
 from silo.bom.errors import RejectedError, SiloError
+from silo.bom.message import message
 from silo.bom.numbers import parse_number, read_quantity, whole_number
 from silo.bom.quantities import plain
 from silo.bom.text import character_problem
@@ -115,8 +116,14 @@ def amount(typed: str, name: str = "quantity") -> Decimal:
     number = parse_number(typed)
     if number is not None and number.other is not None:
         readings = [str(plain(number.other)), str(plain(number.exact))]
-        raise AmbiguousError(f"{name}: {reading.problem}", readings)
-    raise RejectedError(f"{name}: {reading.problem}")
+        raise AmbiguousError(_of_field(name, reading.problem), readings)
+    raise RejectedError(_of_field(name, reading.problem))
+
+
+def _of_field(name: str, problem: str) -> str:
+    if name == "quantity":
+        return message("quantity: {problem}", problem=problem)
+    return message("{part_number}: {problem}", part_number=name, problem=problem)
 
 
 def problems_of(error: SiloError) -> Sequence[str]:
