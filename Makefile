@@ -14,7 +14,10 @@ ifneq ($(MEMORY),)
 IN_MEMORY := $(shell probe=$$(mktemp $(MEMORY)/silo-XXXXXX) && echo exit >$$probe && chmod 700 $$probe && \
     $$probe && echo TMPDIR=$(MEMORY); rm -f $$probe)
 endif
+# The order of the tests is shuffled, by one seed, so that no landing fails by chance: `make test SEED=7` hunts.
+SEED ?= 20261128
 SPREAD = -n $(WORKERS) --durations=60 --durations-min=2
+SHUFFLED = --randomly-seed=$(SEED)
 # Compiled files are kept, whatever the machine's settings; else each process of each run compiles all tests anew.
 export PYTHONDONTWRITEBYTECODE :=
 BIN := $(VENV)/bin
@@ -57,11 +60,11 @@ demo: $(SERVER)
 	$(BIN)/silo-mod demo $(DEMO)
 
 test: setup
-	$(IN_MEMORY) $(BIN)/python -m pytest $(SPREAD) --dist worksteal -m "not freecad and not browser" --ignore=tests/browser
+	$(IN_MEMORY) $(BIN)/python -m pytest $(SPREAD) $(SHUFFLED) --dist worksteal -m "not freecad and not browser" --ignore=tests/browser
 
 # `make test` runs each test over one database, and over both if they might differ; here is the rest.
 test-postgres: setup
-	$(IN_MEMORY) SILO_POSTGRES=1 $(BIN)/python -m pytest $(SPREAD) --dist worksteal -k postgres tests/contract
+	$(IN_MEMORY) SILO_POSTGRES=1 $(BIN)/python -m pytest $(SPREAD) $(SHUFFLED) --dist worksteal -k postgres tests/contract
 
 # Where files are replaced, removed and locked: all but a few of the places that do so are reached from one of these.
 # PostgreSQL's test library is POSIX only.
@@ -73,7 +76,7 @@ ON_WINDOWS = $(addprefix tests/,api/test_config.py api/test_files.py contract/te
 	$(addprefix server/test_,backup.py file_store.py housekeeping.py) \
 	$(addprefix test_,addon_install.py batch.py durable.py folders.py open_in_freecad.py platform.py))
 test-windows-files: setup
-	$(IN_MEMORY) PYTHONPATH=tests/support $(BIN)/python -m pytest -p windows_files $(SPREAD) --dist worksteal \
+	$(IN_MEMORY) PYTHONPATH=tests/support $(BIN)/python -m pytest -p windows_files $(SPREAD) $(SHUFFLED) --dist worksteal \
 		-k "not postgres" -m "not freecad and not browser" $(ON_WINDOWS)
 
 # Where files are found by their names, on a mounted disk that finds a name in any case and normal form.
@@ -82,13 +85,14 @@ BY_NAME = $(addprefix tests/,fcstd/test_links.py fcstd/test_relink.py fcstd/test
 	workbench/revisions $(addprefix cli/test_,bom_diff.py night_job.py project.py) \
 	$(addprefix test_,batch.py open_in_freecad.py spelling.py))
 test-other-disk: setup
-	$(IN_MEMORY) PYTHONPATH=tests/support $(BIN)/python -m pytest -p other_disk_tests $(SPREAD) --dist worksteal \
+	$(IN_MEMORY) PYTHONPATH=tests/support $(BIN)/python -m pytest -p other_disk_tests $(SPREAD) $(SHUFFLED) --dist worksteal \
 		-k "not postgres" -m "not freecad and not browser" $(BY_NAME)
 
 # Only the files with such tests: to collect all others takes each process ten seconds.
+# In the order of their files: the windows of one FreeCAD tell a story, which takes minutes.
 ON_MACHINE = $(shell grep -rlE --include='test_*.py' 'mark\.(freecad|browser)' tests)
 test-machine: setup
-	$(IN_MEMORY) $(BIN)/python -m pytest $(SPREAD) --dist loadscope -m "freecad or browser" tests/browser $(ON_MACHINE)
+	$(IN_MEMORY) $(BIN)/python -m pytest $(SPREAD) -p no:randomly --dist loadscope -m "freecad or browser" tests/browser $(ON_MACHINE)
 
 mutants: setup
 	$(IN_MEMORY) $(BIN)/python scripts/mutants.py
