@@ -11,7 +11,7 @@ from fakes import Doc
 from silo.bom import FindingCode, extract
 from silo.bom.entry import BomEntry, Extraction
 from silo.bom.items.resolve import resolve_with, unregistered_findings
-from silo.bom_sync.resolved import Resolved, assemblies
+from silo.bom_sync.resolved import Resolved, assemblies, assemblies_of_file
 
 BASE, OWN = "00000000-0000-4000-8000-00000000000a", "00000000-0000-4000-8000-00000000000b"
 ITEMS = {
@@ -130,8 +130,9 @@ def test_what_a_variant_holds_is_sent_only_under_a_number_of_its_own() -> None:
         found = extract(top.assembly(link))
         entries, missing = resolve_with(found.entries, ITEMS)
         resolved = Resolved(found.assembly, tuple(entries), tuple(missing), found.findings, {})
-        numbers = [one.assembly.part_number for one in assemblies(resolved)]
-        assert [number for number in numbers if number] == sent
+        for walk in (assemblies, assemblies_of_file):  # in a run over a folder no other file has the copy
+            numbers = [one.assembly.part_number for one in walk(resolved)]
+            assert [number for number in numbers if number] == sent
 
 
 def test_copies_of_a_part_of_the_same_file_are_lines_of_their_values() -> None:

@@ -195,3 +195,13 @@ def assemblies(resolved: Resolved) -> Iterator[Resolved]:
     for entry in below((*resolved.unresolved, *resolved.entries)):
         yield replace(resolved, assembly=entry, entries=entry.children)
     yield resolved
+
+
+def assemblies_of_file(resolved: Resolved) -> Iterator[Resolved]:
+    """Yield the assembly, and before it the configured copies in its file that are items of their own: no
+    other file has their contents.
+    """
+    for assembly in assemblies(resolved):
+        entry = assembly.assembly
+        if entry is resolved.assembly or (entry.variant and entry.copy[0] == resolved.assembly.doc_path):
+            yield assembly

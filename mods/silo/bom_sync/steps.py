@@ -30,7 +30,14 @@ from silo.bom.left_out import components_of
 from silo.bom_sync.held import report_held
 from silo.bom_sync.memory import server_of
 from silo.bom_sync.reported_lines import is_reported, remember_reported
-from silo.bom_sync.resolved import Resolved, assemblies, blocking, left_out_parts, names_of
+from silo.bom_sync.resolved import (
+    Resolved,
+    assemblies,
+    assemblies_of_file,
+    blocking,
+    left_out_parts,
+    names_of,
+)
 
 
 class SyncApi(ItemLookup, Protocol):
@@ -194,7 +201,7 @@ def sync_tree(
     from silo.api.policy import ends_run  # loads the network's packages
 
     stopped: SiloError | None = None
-    for assembly in assemblies(resolved) if recursive else (resolved,):
+    for assembly in (assemblies if recursive else assemblies_of_file)(resolved):
         if stopped is not None:
             yield Outcome(Status.FAILED, assembly, error=stopped)
             continue
