@@ -44,7 +44,7 @@ def test_columns_are_chosen_by_hand(api: Api, visit: Visit, script: bool) -> Non
     else:
         page.locator("details.reading summary").click()
     page.get_by_label("Numbers such as 1,000").select_option(",")
-    page.get_by_role("button", name="Check again").click()
+    page.locator("details.reading").get_by_role("button", name="Check again").click()
     expect(page.locator("#checked")).to_contain_text("2 to add")
     assert api.lines(parent) == {}
     page.get_by_role("button", name="Import 2 rows").click()

@@ -122,5 +122,7 @@ def test_the_keyboard_is_enough(visit: Visit) -> None:
     expect(skip).to_be_in_viewport()
     page.keyboard.press("Enter")
     page.keyboard.press("Tab")
+    wait_for_cursor(page.get_by_role("link", name="Categories"))
+    page.keyboard.press("Tab")
     wait_for_cursor(page.get_by_label("Search"))
     assert measured(page.get_by_label("Search"), "e => getComputedStyle(e).outlineStyle") == "solid"
