@@ -26,7 +26,9 @@ def test_columns_are_chosen_by_hand(api: Api, visit: Visit, script: bool) -> Non
     parent, one, other = api.items(3)
     page = visit("editor", java_script_enabled=script)
     page.goto(f"/items/{parent}/import")
-    check(page, f"Bill of the day;;\nČíslo;Kolik;Pozn\n{one};1.250;abc\n{other};3;\n")
+    # Columns that were chosen once are remembered for files with the same headings.
+    headings = "Číslo;Kolik;Pozn" if script else "Prvek;Kolik;Pozn"
+    check(page, f"Bill of the day;;\n{headings}\n{one};1.250;abc\n{other};3;\n")
     expect(page.get_by_role("alert")).to_contain_text("File: found no header line")
     page.get_by_label("Separated by").select_option("semicolons")
     page.get_by_label("Header").select_option(index=1)
