@@ -157,7 +157,7 @@ class SiloClient(ItemCalls, BomCalls, TableCalls):
         if not self.ready().device_login:
             return None
         asked = {"client_id": program, "machine": socket.gethostname()[:60]}
-        codes = self._transport.send(self._form("", asked)).model(DeviceCodes)
+        codes = self._transport.send(self._form(asked)).model(DeviceCodes)
         # The page is one of the server that was asked, whatever the answer says.
         page = self.web_url(f"/login/device?code={quote(codes.user_code, safe='')}")
         interval = min(max(codes.interval, 1.0), MOST_INTERVAL_S)
@@ -169,7 +169,7 @@ class SiloClient(ItemCalls, BomCalls, TableCalls):
         Raises AuthError if the user refused, or the login is over.
         """
         asked = {"grant_type": DEVICE_GRANT, "device_code": login.device_code, "client_id": "silo-mod"}
-        call = self._form("/token", asked)
+        call = self._form(asked, "token")
         with self._transport.opened(call) as response:
             reply = self._transport.reply(response, call)
         answer = DeviceToken.model_validate(reply.mapping(accept=(400,)))
@@ -188,10 +188,10 @@ class SiloClient(ItemCalls, BomCalls, TableCalls):
             )
         )
 
-    def _form(self, path: str, fields: Mapping[str, str]) -> ApiCall:
+    def _form(self, fields: Mapping[str, str], *more: str) -> ApiCall:
         return ApiCall(
             "POST",
-            f"{self._address.web_root}/api/auth/device{path}",
+            self._address.api("auth", "device", *more),
             message("a login"),
             body=lambda: urlencode(fields),
             headers={"Content-Type": "application/x-www-form-urlencoded"},

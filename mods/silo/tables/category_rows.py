@@ -11,6 +11,7 @@ from silo.bom.message import message
 from silo.tables.bom_rows import refuse_clashes
 from silo.tables.columns import cell_at
 from silo.tables.kind import TableKind
+from silo.tables.read_rows import ReadRows, rows_of
 from silo.tables.sheet import Sheet
 
 # Role → headings. The headings of other tables mean other things here: a "number" is no part's.
@@ -47,13 +48,7 @@ class CategoryRow:
     left_out: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class CategoryRows:
-    """The rows of a list; the titles of the columns that are not used; what was assumed to read it."""
-
-    rows: tuple[CategoryRow, ...]
-    unused: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+CategoryRows = ReadRows[CategoryRow]
 
 
 def category_rows(sheet: Sheet) -> CategoryRows:
@@ -64,4 +59,4 @@ def category_rows(sheet: Sheet) -> CategoryRows:
         texts = {role: cell_at(row.cells, at.get(role)) for role in ROLES}
         empty = "" if any(texts.values()) else message("no cell in a column that is used")
         rows.append(CategoryRow(row.line, texts, empty))
-    return CategoryRows(tuple(rows), tuple(sheet.unused), sheet.notes)
+    return rows_of(sheet, rows)

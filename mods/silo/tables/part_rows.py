@@ -13,6 +13,7 @@ from silo.bom.message import Message, message
 from silo.tables.bom_rows import refuse_clashes
 from silo.tables.columns import cell_at
 from silo.tables.kind import TableKind
+from silo.tables.read_rows import ReadRows, rows_of
 from silo.tables.sheet import Sheet
 from silo.tables.totals import is_total
 from silo.tables.yes_no import read_yes_no
@@ -57,13 +58,7 @@ class PartRow:
     left_out: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class PartRows:
-    """The rows of a list; the titles of the columns that are not used; what was assumed to read it."""
-
-    rows: tuple[PartRow, ...]
-    unused: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+PartRows = ReadRows[PartRow]
 
 
 def part_rows(sheet: Sheet) -> PartRows:
@@ -90,7 +85,7 @@ def part_rows(sheet: Sheet) -> PartRows:
         if said := texts.pop(Heading.ASSEMBLY, ""):
             problems += _assembly(said, texts)
         rows.append(PartRow(row.line, texts, tuple(problems)))
-    return PartRows(tuple(rows), tuple(sheet.unused), sheet.notes)
+    return rows_of(sheet, rows)
 
 
 def _assembly(said: str, texts: dict[str, str]) -> list[Message]:

@@ -26,6 +26,7 @@ from silo.tables.columns import cell_at
 from silo.tables.heading_detail import PriceHeading, currency_of_word, days_of_heading
 from silo.tables.kind import TableKind, heading_role
 from silo.tables.numerals import Numerals
+from silo.tables.read_rows import ReadRows, rows_of
 from silo.tables.sheet import Sheet
 from silo.tables.totals import is_total
 from silo.workbook.sheet import SheetRow
@@ -84,13 +85,7 @@ class PriceRow:
     left_out: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class PriceRows:
-    """The rows of a price list; the titles of the columns that are not used; what was assumed to read it."""
-
-    rows: tuple[PriceRow, ...]
-    unused: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+PriceRows = ReadRows[PriceRow]
 
 
 def price_rows(sheet: Sheet, mark: Mark | None = None) -> PriceRows:
@@ -139,7 +134,7 @@ def price_rows(sheet: Sheet, mark: Mark | None = None) -> PriceRows:
                 )
             given += _prices(row, head, numeral, texts, numerals[Heading.PRICE_BASIS], problems)
         rows.append(PriceRow(row.line, texts, tuple(given), tuple(problems)))
-    return PriceRows(tuple(rows), tuple(sheet.unused), sheet.notes)
+    return rows_of(sheet, rows)
 
 
 def _scales(sheet: Sheet) -> Counter[tuple[str, ...]] | None:

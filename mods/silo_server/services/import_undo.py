@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from functools import partial
 
 from sqlalchemy import func, select, update
 
@@ -44,15 +45,17 @@ def undo_import(tx: Tx, import_id: int) -> Import:
     changed = {int(item_id): columns for item_id, columns in said["changed"].items()}
     ids = {*said["made"], *changed, *(i for i, _ in said["suppliers"]), *(i for i, _ in said["boms"])}
     there, problems = by_ids(tx, ids), list[str]()
-    for undo, pairs in ((_undo_bom_change, said["boms"]), (undo_supplier_change, said["suppliers"])):
+    undo_bom = partial(undo_change, expected=None)
+    for undo, pairs in ((undo_bom, said["boms"]), (undo_supplier_change, said["suppliers"])):
         for item_id, change in reversed(pairs):
             if not there[item_id].archived_at:
                 try:
                     undo(tx, there[item_id].part_number, change)
                 except ConflictError as error:
                     problems.append(str(error))
+    now = by_ids(tx, changed)
     for item_id, columns in changed.items():
-        item = by_ids(tx, [item_id])[item_id]
+        item = now[item_id]
         cells = cells_of(item)
         since = [column for column, (_, after) in columns.items() if cells[column] != after]
         if since:
@@ -82,11 +85,6 @@ def undo_bom_change(tx: Tx, part_number: str, change: int) -> int:
     undo_import(tx, whole.id)
     newest = select(func.max(bom_changes.c.id)).where(bom_changes.c.parent_id == item.id)
     return tx.conn.scalar(newest) or 0
-
-
-def _undo_bom_change(tx: Tx, part_number: str, change: int) -> None:
-    """Undo a change of a BOM."""
-    undo_change(tx, part_number, change, None)
 
 
 def _archive_made(tx: Tx, made: Sequence[Item]) -> list[str]:
